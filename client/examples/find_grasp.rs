@@ -17,9 +17,8 @@ use grasp_client::{
 
 #[tokio::main]
 async fn main() -> Result<(), ClientError> {
-    let url = std::env::args()
-        .nth(1)
-        .unwrap_or_else(|| "http://[::1]:50051".to_owned());
+    let url = std::env::args().nth(1);
+    let url = url.unwrap_or("http://[::1]:50051".to_owned());
     let client = GraspClient::connect(url).await?;
     let request = FindGraspRequest::new("objects/remote")
         // Where the game has the object and the giver's hand; any frame will do, as long as both use the same.
@@ -60,12 +59,8 @@ fn giver() -> HandPose {
 
 fn print_grasp(grasp: &Grasp) {
     let Some(hand) = &grasp.hand else { return };
-    println!(
-        "{:?} hand, {}, type {:?}",
-        hand.handedness(),
-        hand.rig,
-        grasp.r#type()
-    );
+    let (side, rig) = (hand.handedness(), &hand.rig);
+    println!("{side:?} hand, {rig}, type {:?}", grasp.r#type());
     if let Some(wrist) = &hand.client_from_wrist {
         println!("wrist: {}", shown(wrist.position(), wrist.orientation()));
     }

@@ -10,7 +10,7 @@
 use std::{error::Error, fs, path::PathBuf, time::Duration};
 
 use grasp_client::{
-    ClientError, GraspClient, Handedness, Preference,
+    ClientError, Code, GraspClient, Handedness, Preference,
     json::from_json,
     v1::{CreateObjectRequest, FindGraspRequest, GraspObject, HandJoints, Region},
 };
@@ -19,15 +19,9 @@ use grasp_client::{
 async fn main() -> Result<(), Box<dyn Error>> {
     let data = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data"));
     let mut arguments = std::env::args().skip(1);
-    let url = arguments
-        .next()
-        .unwrap_or_else(|| "http://[::1]:50051".to_owned());
-    let mesh = arguments
-        .next()
-        .map_or_else(|| data.join("torch.obj"), PathBuf::from);
-    let hand = arguments
-        .next()
-        .map_or_else(|| data.join("tracked_hand.json"), PathBuf::from);
+    let url = arguments.next().unwrap_or("http://[::1]:50051".to_owned());
+    let mut file = |default| arguments.next().map_or(data.join(default), PathBuf::from);
+    let (mesh, hand) = (file("torch.obj"), file("tracked_hand.json"));
 
     let client = GraspClient::connect(url).await?;
     let object = register(&client, fs::read(mesh)?).await?;
@@ -78,14 +72,8 @@ async fn register(client: &GraspClient, obj: Vec<u8>) -> Result<GraspObject, Cli
         ..Region::new("lens", Preference::Forbidden)
     }];
     match client.create_object(&torch).await {
-        Err(ClientError::AlreadyExists(_)) => client.get_object("objects/torch").await,
-        // Lists everything wrong with the file, with line numbers.
-        Err(ClientError::InvalidArgument(call)) => {
-            for violation in &call.details.field_violations {
-                eprintln!("{}: {}", violation.field, violation.description);
-            }
-            Err(ClientError::InvalidArgument(call))
-        }
+        Err(error) if error.code() == Some(Code::AlreadyExists) => client.get_object("objects/torch").await,
+        // An error lists everything wrong with the file, with line numbers.
         result => result,
     }
 }

@@ -48,7 +48,10 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let recording = play(&mut stream, TrackRecording::new(&track)).await?;
 
     let object = Part::built_in_object(OBJECT).ok_or("the object is not built in")?;
-    write(&glb, &recording.to_glb(object)?)?;
+    if let Some(folder) = Path::new(&glb).parent() {
+        fs::create_dir_all(folder)?;
+    }
+    fs::write(&glb, recording.to_glb(object)?)?;
     println!("written: {glb}");
     Ok(())
 }
@@ -149,12 +152,4 @@ fn giver(moved: Pose, opened: f32) -> HandPose {
     HandPose::new("rigs/thesis", Handedness::Right)
         .with_client_from_wrist(moved * wrist)
         .with_digits(digits)
-}
-
-/// Writes a file, creating its folder if necessary.
-fn write(path: &str, bytes: &[u8]) -> std::io::Result<()> {
-    if let Some(folder) = Path::new(path).parent() {
-        fs::create_dir_all(folder)?;
-    }
-    fs::write(path, bytes)
 }

@@ -76,12 +76,11 @@ impl GraspClientBuilder {
     /// # Errors
     /// [`ClientError::Endpoint`] or [`ClientError::Connect`].
     pub async fn connect(self) -> Result<GraspClient, ClientError> {
-        let channel = open(self.transport_endpoint()?)
-            .await
-            .map_err(|error| ClientError::Connect {
-                endpoint: self.endpoint.clone(),
-                source: error.into(),
-            })?;
+        let channel = open(self.transport_endpoint()?).await;
+        let channel = channel.map_err(|error| ClientError::Connect {
+            endpoint: self.endpoint.clone(),
+            source: error.into(),
+        })?;
         Ok(self.over(channel))
     }
 
@@ -173,15 +172,17 @@ impl GraspClient {
     /// plus the request's budget. Dropping the future stops the search on the server.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
+    /// Any except those of connecting; the violations of `InvalidArgument` list everything wrong with the request.
     pub async fn find_grasp(
         &self,
         request: &v1::FindGraspRequest,
     ) -> Result<v1::FindGraspResponse, ClientError> {
-        let timeout = self.timeout_with(request.budget());
-        self.call("FindGrasp", timeout, request, |channel, request| async move {
-            GraspServiceClient::new(channel).find_grasp(request).await
-        })
+        self.call(
+            "FindGrasp",
+            request.budget(),
+            request,
+            |channel, request| async move { GraspServiceClient::new(channel).find_grasp(request).await },
+        )
         .await
     }
 
@@ -189,15 +190,17 @@ impl GraspClient {
     /// answer, not an error. Takes at most the call timeout plus the time to search for one near it.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
+    /// Any except those of connecting; the violations of `InvalidArgument` list everything wrong with the request.
     pub async fn validate_grasp(
         &self,
         request: &v1::ValidateGraspRequest,
     ) -> Result<v1::ValidateGraspResponse, ClientError> {
-        let timeout = self.timeout_with(request.nearest_budget());
-        self.call("ValidateGrasp", timeout, request, |channel, request| async move {
-            GraspServiceClient::new(channel).validate_grasp(request).await
-        })
+        self.call(
+            "ValidateGrasp",
+            request.nearest_budget(),
+            request,
+            |channel, request| async move { GraspServiceClient::new(channel).validate_grasp(request).await },
+        )
         .await
     }
 
@@ -205,21 +208,15 @@ impl GraspClient {
     /// timeout plus the request's budget.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
+    /// Any except those of connecting; the violations of `InvalidArgument` list everything wrong with the request.
     pub async fn evaluate_holdout(
         &self,
         request: &v1::EvaluateHoldoutRequest,
     ) -> Result<v1::EvaluateHoldoutResponse, ClientError> {
-        let timeout = self.timeout_with(request.budget());
-        self.call("EvaluateHoldout", timeout, request, |channel, request| async move {
+        self.call("EvaluateHoldout", request.budget(), request, |channel, request| async move {
             GraspServiceClient::new(channel).evaluate_holdout(request).await
         })
         .await
-    }
-
-    /// The time limit of a call that may search so long.
-    pub(crate) fn timeout_with(&self, budget: Option<Duration>) -> Duration {
-        self.call_timeout.saturating_add(budget.unwrap_or_default())
     }
 
     /// Queries the health of the whole server.
@@ -229,7 +226,7 @@ impl GraspClient {
     pub async fn health(&self) -> Result<Health, ClientError> {
         let message = HealthCheckRequest::default();
         let answer = self
-            .short_call("Check", &message, |channel, request| async move {
+            .call("Check", None, &message, |channel, request| async move {
                 HealthClient::new(channel).check(request).await
             })
             .await?;
@@ -240,25 +237,12 @@ impl GraspClient {
         })
     }
 
-    /// Like [`Self::call`], for a call that does not search.
-    pub(crate) async fn short_call<M, T, F>(
-        &self,
-        method: &'static str,
-        message: &M,
-        send: impl Fn(Channel, Request<M>) -> F,
-    ) -> Result<T, ClientError>
-    where
-        M: Clone,
-        F: Future<Output = Result<Response<T>, Status>>,
-    {
-        self.call(method, self.call_timeout, message, send).await
-    }
-
-    /// Sends `message` until it is answered, fails permanently, or `timeout` has passed since the first attempt.
+    /// Sends `message` until it is answered, fails permanently, or the call timeout and `budget` have passed since the first
+    /// attempt.
     pub(crate) async fn call<M, T, F>(
         &self,
         method: &'static str,
-        timeout: Duration,
+        budget: Option<Duration>,
         message: &M,
         send: impl Fn(Channel, Request<M>) -> F,
     ) -> Result<T, ClientError>
@@ -266,6 +250,7 @@ impl GraspClient {
         M: Clone,
         F: Future<Output = Result<Response<T>, Status>>,
     {
+        let timeout = self.call_timeout.saturating_add(budget.unwrap_or_default());
         let start = Instant::now();
         let mut attempts = 0;
         loop {

@@ -28,7 +28,7 @@
 //! - [`GraspStream`] has every better grasp as it is found, or the best that differ.
 //! - [`TrackStream`] holds on to a grasp while giver and object move, frame by frame.
 //! - [`ObjectWatch`] tells what happens to objects.
-//! - [`ClientError`] distinguishes failures and carries the standard details that the server attached.
+//! - [`ClientError`] has the code of a failed call and the standard details that the server attached.
 //!
 //! All poses are in one frame of the client's choice; a field named `a_from_b` maps points of frame b to frame a. Metres,
 //! kilograms, newtons, radians and unit quaternions, in the axes of the request's [`Convention`].
@@ -47,7 +47,7 @@ mod retry;
 mod streams;
 
 pub use client::{GraspClient, GraspClientBuilder, Health};
-pub use error::{BoxError, CallError, ClientError, ErrorDetails, FieldViolation, Resource, code_name};
+pub use error::{BoxError, CallError, ClientError, code_name};
 pub use grasp_proto::{
     JOINT_COUNT, std_duration,
     v1::{
@@ -56,9 +56,11 @@ pub use grasp_proto::{
     },
     wire_duration,
 };
-pub use objects::{ObjectMesh, ObjectWatch};
+pub use objects::ObjectMesh;
 pub use retry::RetryPolicy;
-pub use streams::{GraspStream, TrackFrames, TrackStream};
+pub use streams::{GraspStream, MessageStream, ObjectWatch, TrackStream};
+pub use tonic::Code;
+pub use tonic_types::{ErrorDetails, FieldViolation};
 
 /// The README's Rust example compiles.
 #[cfg(doctest)]

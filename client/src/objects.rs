@@ -7,10 +7,14 @@ use grasp_proto::v1::{
     upload_object_request::Part,
 };
 use sha2::{Digest as _, Sha256};
-use tonic::{Request, Status, Streaming};
+use tonic::{Request, Status};
 use uuid::Uuid;
 
-use crate::{client::GraspClient, error::ClientError};
+use crate::{
+    client::GraspClient,
+    error::ClientError,
+    streams::{MessageStream, ObjectWatch},
+};
 
 /// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
 /// pieces.
@@ -22,10 +26,6 @@ const PIECE_BYTES: usize = 256 << 10;
 /// Bytes of a mesh per second that an upload is given in addition to the call timeout.
 const SLOWEST_UPLOAD: usize = 1 << 20;
 
-/// Bytes of a GLB file until its length has been read, and what they begin with.
-const GLB_HEADER: usize = 12;
-const GLB_MAGIC: [u8; 4] = *b"glTF";
-
 /// An object's mesh as searches use it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ObjectMesh {
@@ -34,22 +34,6 @@ pub struct ObjectMesh {
     pub glb: Vec<u8>,
     /// The state of the object that it belongs to.
     pub etag: String,
-}
-
-/// News of objects, as they happen. Dropping it ends the watch.
-#[derive(Debug)]
-pub struct ObjectWatch(Streaming<v1::WatchObjectsResponse>);
-
-impl ObjectWatch {
-    /// Waits for the next news; `None` if the server ended the watch without an error. Cancelling the wait loses nothing.
-    ///
-    /// # Errors
-    /// Any except those of connecting; [`ClientError::Unavailable`] when the server shuts down,
-    /// [`ClientError::ResourceExhausted`] if this client reads too slowly. Watch again then, with the present objects.
-    pub async fn next(&mut self) -> Result<Option<v1::WatchObjectsResponse>, ClientError> {
-        let news = self.0.message().await;
-        news.map_err(|status| ClientError::from_status(&status, 1))
-    }
 }
 
 impl GraspClient {
@@ -65,7 +49,7 @@ impl GraspClient {
         let mut request = request.clone();
         loop {
             let page = self
-                .short_call("ListObjects", &request, |channel, request| async move {
+                .call("ListObjects", None, &request, |channel, request| async move {
                     ObjectServiceClient::new(channel).list_objects(request).await
                 })
                 .await?;
@@ -80,10 +64,10 @@ impl GraspClient {
     /// One object; `name` is "objects/{object}".
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
+    /// Any except those of connecting; `NotFound` if the object does not exist.
     pub async fn get_object(&self, name: impl Into<String>) -> Result<v1::GraspObject, ClientError> {
         let message = v1::GetObjectRequest { name: name.into() };
-        self.short_call("GetObject", &message, |channel, request| async move {
+        self.call("GetObject", None, &message, |channel, request| async move {
             ObjectServiceClient::new(channel).get_object(request).await
         })
         .await
@@ -92,10 +76,10 @@ impl GraspClient {
     /// The state of an object's atlas for one hand; `name` is "objects/{object}/atlases/left" or ".../right".
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
+    /// Any except those of connecting; `NotFound` if the object does not exist.
     pub async fn get_atlas(&self, name: impl Into<String>) -> Result<v1::Atlas, ClientError> {
         let message = v1::GetAtlasRequest { name: name.into() };
-        self.short_call("GetAtlas", &message, |channel, request| async move {
+        self.call("GetAtlas", None, &message, |channel, request| async move {
             ObjectServiceClient::new(channel).get_atlas(request).await
         })
         .await
@@ -106,8 +90,8 @@ impl GraspClient {
     /// answer was about. Takes at most the call timeout and, in pieces, a second per MiB.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the object,
-    /// [`ClientError::AlreadyExists`] means that another call created an object with this name.
+    /// Any except those of connecting; the violations of `InvalidArgument` list everything wrong with the object,
+    /// `AlreadyExists` means that another call created an object with this name.
     pub async fn create_object(
         &self,
         request: &v1::CreateObjectRequest,
@@ -120,23 +104,23 @@ impl GraspClient {
             let mesh = std::mem::take(&mut request.mesh);
             return self.upload_object(request, mesh).await;
         }
-        self.short_call("CreateObject", &request, |channel, request| async move {
+        self.call("CreateObject", None, &request, |channel, request| async move {
             ObjectServiceClient::new(channel).create_object(request).await
         })
         .await
     }
 
     /// Changes an object. A retry after a lost answer changes nothing further; with an etag, it fails with
-    /// [`ClientError::Aborted`].
+    /// `Aborted`.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::Aborted`] if the object has another etag,
-    /// [`ClientError::FailedPrecondition`] if the server started with it.
+    /// Any except those of connecting; `Aborted` if the object has another etag,
+    /// `FailedPrecondition` if the server started with it.
     pub async fn update_object(
         &self,
         request: &v1::UpdateObjectRequest,
     ) -> Result<v1::GraspObject, ClientError> {
-        self.short_call("UpdateObject", request, |channel, request| async move {
+        self.call("UpdateObject", None, request, |channel, request| async move {
             ObjectServiceClient::new(channel).update_object(request).await
         })
         .await
@@ -145,8 +129,8 @@ impl GraspClient {
     /// Deletes an object that exists; `name` is "objects/{object}". With an etag, only if the object still has it.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::Aborted`] if the object has another etag,
-    /// [`ClientError::FailedPrecondition`] if the server started with it. After a retry, [`ClientError::NotFound`] may mean
+    /// Any except those of connecting; `Aborted` if the object has another etag,
+    /// `FailedPrecondition` if the server started with it. After a retry, `NotFound` may mean
     /// that the lost answer was about its deletion.
     pub async fn delete_object(
         &self,
@@ -158,7 +142,7 @@ impl GraspClient {
             etag: etag.unwrap_or_default(),
             allow_missing: false,
         };
-        self.short_call("DeleteObject", &message, |channel, request| async move {
+        self.call("DeleteObject", None, &message, |channel, request| async move {
             ObjectServiceClient::new(channel).delete_object(request).await
         })
         .await
@@ -170,28 +154,32 @@ impl GraspClient {
         described: v1::CreateObjectRequest,
         mesh: Vec<u8>,
     ) -> Result<v1::GraspObject, ClientError> {
-        let seconds = mesh.len().div_ceil(SLOWEST_UPLOAD) as u64;
-        let timeout = self.call_timeout.saturating_add(Duration::from_secs(seconds));
+        let time = Duration::from_secs(mesh.len().div_ceil(SLOWEST_UPLOAD) as u64);
         let upload = Upload {
             described,
             mesh: mesh.into(),
         };
-        self.call("UploadObject", timeout, &upload, |channel, request| async move {
-            let (metadata, extensions, upload) = request.into_parts();
-            let request = Request::from_parts(metadata, extensions, tokio_stream::iter(upload.parts()));
-            ObjectServiceClient::new(channel).upload_object(request).await
-        })
+        self.call(
+            "UploadObject",
+            Some(time),
+            &upload,
+            |channel, request| async move {
+                let (metadata, extensions, upload) = request.into_parts();
+                let request = Request::from_parts(metadata, extensions, tokio_stream::iter(upload.parts()));
+                ObjectServiceClient::new(channel).upload_object(request).await
+            },
+        )
         .await
     }
 
     /// An object's mesh as searches use it; `name` is "objects/{object}". The call timeout applies to each part.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
+    /// Any except those of connecting; `NotFound` if the object does not exist.
     pub async fn get_mesh(&self, name: impl Into<String>) -> Result<ObjectMesh, ClientError> {
         let message = v1::GetMeshRequest { name: name.into() };
         let mut parts = self
-            .short_call("GetMesh", &message, |channel, request| async move {
+            .call("GetMesh", None, &message, |channel, request| async move {
                 ObjectServiceClient::new(channel).get_mesh(request).await
             })
             .await?;
@@ -204,21 +192,14 @@ impl GraspClient {
         loop {
             let part = tokio::time::timeout(limit, parts.message()).await;
             let part = part.map_err(late).flatten();
-            let Some(part) = part.map_err(|status| ClientError::from_status(&status, 1))? else {
-                break;
-            };
-            if mesh.glb.is_empty() {
-                mesh.etag = part.etag;
+            match part.map_err(|status| ClientError::from_status(&status, 1))? {
+                None => return Ok(mesh),
+                Some(part) => {
+                    mesh.glb.extend(part.piece);
+                    // The first part has it, and the others none.
+                    mesh.etag += &part.etag;
+                }
             }
-            mesh.glb.extend(part.piece);
-            if length(&mesh.glb)?.is_some_and(|length| mesh.glb.len() > length) {
-                return Err(ClientError::malformed("piece", "exceeds the file's length"));
-            }
-        }
-        if length(&mesh.glb)? == Some(mesh.glb.len()) {
-            Ok(mesh)
-        } else {
-            Err(ClientError::malformed("piece", "is missing: the file is cut off"))
         }
     }
 
@@ -236,19 +217,13 @@ impl GraspClient {
             filter: filter.into(),
             include_present,
         };
-        let news = self
-            .call(
-                "WatchObjects",
-                self.call_timeout,
-                &message,
-                |channel, mut request| async move {
-                    // A deadline would end the watch.
-                    request.metadata_mut().remove("grpc-timeout");
-                    ObjectServiceClient::new(channel).watch_objects(request).await
-                },
-            )
-            .await?;
-        Ok(ObjectWatch(news))
+        let watch = |channel, mut request: Request<_>| async move {
+            // A deadline would end the watch.
+            request.metadata_mut().remove("grpc-timeout");
+            ObjectServiceClient::new(channel).watch_objects(request).await
+        };
+        let news = self.call("WatchObjects", None, &message, watch).await?;
+        Ok(MessageStream(news))
     }
 
     /// All rigs of hands, sorted by name, from as many pages as needed.
@@ -260,7 +235,7 @@ impl GraspClient {
         let mut message = v1::ListRigsRequest::default();
         loop {
             let page = self
-                .short_call("ListRigs", &message, |channel, request| async move {
+                .call("ListRigs", None, &message, |channel, request| async move {
                     HandRigServiceClient::new(channel).list_rigs(request).await
                 })
                 .await?;
@@ -275,10 +250,10 @@ impl GraspClient {
     /// One rig; `name` is "rigs/{rig}".
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::NotFound`] if the rig does not exist.
+    /// Any except those of connecting; `NotFound` if the rig does not exist.
     pub async fn get_rig(&self, name: impl Into<String>) -> Result<v1::HandRig, ClientError> {
         let message = v1::GetRigRequest { name: name.into() };
-        self.short_call("GetRig", &message, |channel, request| async move {
+        self.call("GetRig", None, &message, |channel, request| async move {
             HandRigServiceClient::new(channel).get_rig(request).await
         })
         .await
@@ -287,9 +262,9 @@ impl GraspClient {
     /// Creates a rig; retried as [`create_object`](Self::create_object) is.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the rig.
+    /// Any except those of connecting; the violations of `InvalidArgument` list everything wrong with the rig.
     pub async fn create_rig(&self, request: &v1::CreateRigRequest) -> Result<v1::HandRig, ClientError> {
-        self.short_call("CreateRig", request, |channel, request| async move {
+        self.call("CreateRig", None, request, |channel, request| async move {
             HandRigServiceClient::new(channel).create_rig(request).await
         })
         .await
@@ -298,10 +273,10 @@ impl GraspClient {
     /// Deletes a created rig; `name` is "rigs/{rig}".
     ///
     /// # Errors
-    /// Any except those of connecting. If an answer was lost, the retry ends with [`ClientError::NotFound`].
+    /// Any except those of connecting. If an answer was lost, the retry ends with `NotFound`.
     pub async fn delete_rig(&self, name: impl Into<String>) -> Result<(), ClientError> {
         let message = v1::DeleteRigRequest { name: name.into() };
-        self.short_call("DeleteRig", &message, |channel, request| async move {
+        self.call("DeleteRig", None, &message, |channel, request| async move {
             HandRigServiceClient::new(channel).delete_rig(request).await
         })
         .await
@@ -312,23 +287,11 @@ impl GraspClient {
 fn next_token(token: &str, next: String) -> Result<Option<String>, ClientError> {
     if !next.is_empty() && next == token {
         // Following it would never end.
-        let problem = "repeats the token of the previous page";
-        return Err(ClientError::malformed("next_page_token", problem));
+        return Err(ClientError::Malformed(
+            "next_page_token repeats that of the previous page",
+        ));
     }
     Ok(Some(next).filter(|next| !next.is_empty()))
-}
-
-/// The length in bytes that the header of a GLB file states; `None` before the header is complete.
-fn length(glb: &[u8]) -> Result<Option<usize>, ClientError> {
-    let Some(header) = glb.first_chunk::<GLB_HEADER>() else {
-        return Ok(None);
-    };
-    let [m, a, g, i, _, _, _, _, length @ ..] = *header;
-    if [m, a, g, i] == GLB_MAGIC {
-        Ok(Some(u32::from_le_bytes(length) as usize))
-    } else {
-        Err(ClientError::malformed("piece", "does not begin a GLB file"))
-    }
 }
 
 /// An object to upload; its clones share the mesh.

@@ -89,18 +89,6 @@ fn random_fraction() -> f64 {
 mod tests {
     use super::*;
 
-    fn unavailable() -> Status {
-        Status::unavailable("draining")
-    }
-
-    fn with_pushback(value: &str) -> Status {
-        let mut status = unavailable();
-        status
-            .metadata_mut()
-            .insert(PUSHBACK_TRAILER, value.parse().unwrap());
-        status
-    }
-
     #[test]
     fn waits_grow_to_the_maximum_within_jitter() {
         let policy = RetryPolicy {
@@ -120,40 +108,40 @@ mod tests {
     }
 
     #[test]
-    fn retries_only_unavailable_and_a_bounded_number_of_times() {
+    fn only_unavailable_is_retried_and_a_bounded_number_of_times() {
         let policy = RetryPolicy::default();
         for code in 0..=16 {
             let status = Status::new(Code::from(code), "");
             let again = policy.wait_after(1, &status).is_some();
             assert_eq!(again, code == 14, "code {code}");
         }
-        assert!(policy.wait_after(3, &unavailable()).is_some());
-        assert_eq!(policy.wait_after(4, &unavailable()), None);
-        assert_eq!(RetryPolicy::NEVER.wait_after(1, &unavailable()), None);
+        let status = Status::unavailable("draining");
+        assert!(policy.wait_after(3, &status).is_some());
+        assert_eq!(policy.wait_after(4, &status), None);
+        assert_eq!(RetryPolicy::NEVER.wait_after(1, &status), None);
     }
 
     #[test]
-    fn pushback_sets_wait_or_stops() {
+    fn pushback_sets_wait_or_stops_and_retry_info_only_lengthens_waits() {
         let policy = RetryPolicy::default();
-        assert_eq!(
-            policy.wait_after(1, &with_pushback("30")),
-            Some(Duration::from_millis(30))
-        );
-        assert_eq!(policy.wait_after(1, &with_pushback("-1")), None);
-        assert_eq!(policy.wait_after(1, &with_pushback("soon")), None);
-        assert_eq!(policy.wait_after(4, &with_pushback("30")), None);
-    }
-
-    #[test]
-    fn retry_info_only_lengthens_waits() {
-        let asking = |delay| {
+        let millis = Duration::from_millis;
+        for (pushback, attempts, expected) in [
+            ("30", 1, Some(millis(30))),
+            ("-1", 1, None),
+            ("soon", 1, None),
+            ("30", 4, None),
+        ] {
+            let mut status = Status::unavailable("draining");
+            status
+                .metadata_mut()
+                .insert(PUSHBACK_TRAILER, pushback.parse().unwrap());
+            assert_eq!(policy.wait_after(attempts, &status), expected, "{pushback}");
+        }
+        for (delay, longest) in [(millis(5000), millis(5000)), (millis(1), millis(120))] {
             let details = tonic_types::ErrorDetails::with_retry_info(Some(delay));
-            Status::with_error_details(Code::Unavailable, "busy", details)
-        };
-        let policy = RetryPolicy::default();
-        let long = Duration::from_secs(5);
-        assert_eq!(policy.wait_after(1, &asking(long)), Some(long));
-        let wait = policy.wait_after(1, &asking(Duration::from_millis(1))).unwrap();
-        assert!(wait >= Duration::from_millis(80), "{wait:?}");
+            let status = Status::with_error_details(Code::Unavailable, "busy", details);
+            let wait = policy.wait_after(1, &status).unwrap();
+            assert!(wait >= delay.max(millis(80)) && wait <= longest, "{wait:?}");
+        }
     }
 }

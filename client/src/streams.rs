@@ -1,10 +1,5 @@
 //! The client's streams of grasps: better ones as they are found, the best that differ, and those of a giver who moves.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicU64, Ordering},
-};
-
 use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, track_holdout_request::Message};
 use tokio::sync::watch;
 use tokio_stream::{StreamExt as _, wrappers::WatchStream};
@@ -12,18 +7,23 @@ use tonic::{Request, Streaming};
 
 use crate::{client::GraspClient, error::ClientError};
 
-/// The grasps of a search, as they come. Dropping it stops the search on the server.
+/// Messages of the server, as they come. Dropping it ends the call, and a search with it.
 #[derive(Debug)]
-pub struct GraspStream(Streaming<v1::FindGraspResponse>);
+pub struct MessageStream<M>(pub(crate) Streaming<M>);
 
-impl GraspStream {
-    /// Waits for the next message: a grasp or, at the end, the outcome without one; `None` after that. Cancelling the wait loses
-    /// nothing.
+/// The grasps of a search, as they are found: after the last one comes the outcome, without a grasp.
+pub type GraspStream = MessageStream<v1::FindGraspResponse>;
+
+/// News of objects, as they happen.
+pub type ObjectWatch = MessageStream<v1::WatchObjectsResponse>;
+
+impl<M> MessageStream<M> {
+    /// Waits for the next message; `None` after the last one. Cancelling the wait loses nothing.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::Unavailable`] when the server shuts down,
-    /// [`ClientError::DeadlineExceeded`] if this client reads too slowly.
-    pub async fn next(&mut self) -> Result<Option<v1::FindGraspResponse>, ClientError> {
+    /// Any except those of connecting; with the code `Unavailable` when the server shuts down, and `DeadlineExceeded` of grasps or
+    /// `ResourceExhausted` of news if this client reads too slowly. Watch again then, with the present objects.
+    pub async fn next(&mut self) -> Result<Option<M>, ClientError> {
         let message = self.0.message().await;
         message.map_err(|status| ClientError::from_status(&status, 1))
     }
@@ -33,49 +33,29 @@ impl GraspStream {
 /// for a while meets at most six old ones, as frames say how many were read. Dropping it ends the track.
 #[derive(Debug)]
 pub struct TrackStream {
-    frames: TrackFrames,
-    answers: Streaming<v1::TrackAnswer>,
-}
-
-/// The frames' side of a track, to send frames from elsewhere.
-#[derive(Clone, Debug)]
-pub struct TrackFrames {
     latest: watch::Sender<Option<v1::TrackFrame>>,
-    /// Number of answers that were read.
-    answers_read: Arc<AtomicU64>,
-}
-
-impl TrackFrames {
-    /// Sends a frame, in place of one that has not left yet. Does not wait. Its `answers_read` is set here.
-    pub fn send(&self, frame: &v1::TrackFrame) {
-        let frame = v1::TrackFrame {
-            answers_read: Some(self.answers_read.load(Ordering::Relaxed)),
-            ..frame.clone()
-        };
-        self.latest.send_replace(Some(frame));
-    }
+    answers: MessageStream<v1::TrackAnswer>,
+    answers_read: u64,
 }
 
 impl TrackStream {
     /// Sends a frame, in place of one that has not left yet. Does not wait. Its `answers_read` is set here.
     pub fn send(&self, frame: &v1::TrackFrame) {
-        self.frames.send(frame);
-    }
-
-    /// The frames' side, which keeps the track open as long as it lives.
-    pub fn frames(&self) -> TrackFrames {
-        self.frames.clone()
+        self.latest.send_replace(Some(v1::TrackFrame {
+            answers_read: Some(self.answers_read),
+            ..frame.clone()
+        }));
     }
 
     /// Waits for the next answer; `None` after the answer to the last frame, once the server has ended the track without an error.
     /// Cancelling the wait loses nothing.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::DeadlineExceeded`] if no frame came for too long, [`ClientError::Unavailable`] when the server shuts down.
+    /// Any except those of connecting; with the code `DeadlineExceeded` if no frame came for too long, and `Unavailable` when the
+    /// server shuts down.
     pub async fn answer(&mut self) -> Result<Option<v1::TrackAnswer>, ClientError> {
-        let answer = self.answers.message().await;
-        let answer = answer.map_err(|status| ClientError::from_status(&status, 1))?;
-        self.frames.answers_read.fetch_add(1, Ordering::Relaxed);
+        let answer = self.answers.next().await?;
+        self.answers_read += 1;
         Ok(answer)
     }
 }
@@ -85,48 +65,39 @@ impl GraspClient {
     /// plus the budget.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
+    /// Any except those of connecting; its violations list everything wrong with the request.
     pub async fn stream_grasps(&self, request: &v1::StreamGraspsRequest) -> Result<GraspStream, ClientError> {
-        let timeout = self.timeout_with(request.budget());
+        let stream =
+            |channel, request| async move { GraspServiceClient::new(channel).stream_grasps(request).await };
         let messages = self
-            .call("StreamGrasps", timeout, request, |channel, request| async move {
-                GraspServiceClient::new(channel).stream_grasps(request).await
-            })
+            .call("StreamGrasps", request.budget(), request, stream)
             .await?;
-        Ok(GraspStream(messages))
+        Ok(MessageStream(messages))
     }
 
     /// Starts to track a giver who moves. The call timeout applies to the start only.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the track.
+    /// Any except those of connecting; its violations list everything wrong with the track.
     pub async fn track(&self, track: &v1::Track) -> Result<TrackStream, ClientError> {
-        let (frames, answers) = self
-            .call(
-                "TrackHoldout",
-                self.call_timeout,
-                track,
-                |channel, request| async move {
-                    let (mut metadata, extensions, track) = request.into_parts();
-                    // A deadline would end the track.
-                    metadata.remove("grpc-timeout");
-                    let (frames, latest) = watch::channel(None);
-                    let first = tokio_stream::once(Message::Track(track));
-                    let later =
-                        WatchStream::from_changes(latest).filter_map(|frame| frame.map(Message::Frame));
-                    let messages = first.chain(later).map(|message| v1::TrackHoldoutRequest {
-                        message: Some(message),
-                    });
-                    let request = Request::from_parts(metadata, extensions, messages);
-                    let answered = GraspServiceClient::new(channel).track_holdout(request).await?;
-                    let frames = TrackFrames {
-                        latest: frames,
-                        answers_read: Arc::default(),
-                    };
-                    Ok(answered.map(|answers| (frames, answers)))
-                },
-            )
-            .await?;
-        Ok(TrackStream { frames, answers })
+        let start = |channel, request: Request<v1::Track>| async move {
+            let (mut metadata, extensions, track) = request.into_parts();
+            // A deadline would end the track.
+            metadata.remove("grpc-timeout");
+            let (frames, latest) = watch::channel(None);
+            let first = tokio_stream::once(Message::Track(track));
+            let later = WatchStream::from_changes(latest).filter_map(|frame| frame.map(Message::Frame));
+            let messages = first.chain(later).map(|message| v1::TrackHoldoutRequest {
+                message: Some(message),
+            });
+            let request = Request::from_parts(metadata, extensions, messages);
+            let answered = GraspServiceClient::new(channel).track_holdout(request).await?;
+            Ok(answered.map(|answers| TrackStream {
+                latest: frames,
+                answers: MessageStream(answers),
+                answers_read: 0,
+            }))
+        };
+        self.call("TrackHoldout", None, track, start).await
     }
 }

@@ -11,9 +11,9 @@ use clap::Args;
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
 use grasp_client::{GraspChoice, GraspClient, Handedness, Outcome, Strategy, built_in::request_for, v1};
 use grasp_scene::{Handover, Image, Part, ViewSize, contact_sheet};
-use grasp_server::{Config, ServeError, config::StorePlace};
+use grasp_server::{Config, config::StorePlace};
 use serde_json::json;
-use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
+use tokio::{net::TcpListener, sync::oneshot};
 
 use crate::{
     EXIT_CODES, Ending, Failure, Output, blocking,
@@ -66,7 +66,6 @@ pub(crate) struct Arguments {
     budget: Duration,
 }
 
-/// A holdout with the answer to its request.
 struct AnsweredHoldout {
     holdout: &'static BuiltInHoldout,
     answer: v1::FindGraspResponse,
@@ -82,31 +81,36 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         let names = arguments.holdout.iter();
         names.map(|name| built_in(name)).collect::<Result<_, _>>()?
     };
-    let server = LocalServer::start(arguments.budget).await?;
-    if arguments.strategy == Strategy::Guided {
-        wait_for_atlases(&server.client).await?;
-    }
     // A step to find each grasp, one to draw it, and one for the overview.
     let progress = bar(2 * chosen.len() as u64 + 1, "{pos:>2}/{len}");
     let step = |message: String| {
         progress.set_message(message);
         progress.inc(1);
     };
-    let mut all = Vec::new();
-    for holdout in chosen {
-        step(format!("asking for {}", holdout.name));
-        let start = Instant::now();
-        let answer = server.client.find_grasp(&arguments.request(holdout)).await?;
-        let file = |extension: &str| arguments.out.join(format!("{}.{extension}", holdout.name));
-        all.push(AnsweredHoldout {
-            holdout,
-            answer,
-            round_trip: start.elapsed(),
-            picture: file("png"),
-            scene: file("glb"),
-        });
-    }
-    server.stop().await?;
+    // Prefers IPv6, like the server's default; containers often have IPv4 only.
+    let addresses = [
+        SocketAddr::from((Ipv6Addr::LOCALHOST, 0)),
+        SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
+    ];
+    let failed = |error| Failure::other("cannot listen on the loopback interface", error);
+    let listener = TcpListener::bind(&addresses[..]).await.map_err(failed)?;
+    let url = format!("http://{}", listener.local_addr().map_err(failed)?);
+    let mut config = Config {
+        place: StorePlace::Memory,
+        ..Config::default()
+    };
+    config.budgets.maximum = config.budgets.maximum.max(arguments.budget);
+    let (stop, stopped) = oneshot::channel::<()>();
+    let serving = grasp_server::run(listener, config, async { stopped.await.unwrap_or_default() });
+    let asking = async {
+        let all = arguments.ask(url, chosen, step).await;
+        drop(stop);
+        all
+    };
+    let (served, all) = tokio::join!(tokio::spawn(serving), asking);
+    let served = served.map_err(|error| Failure::other("the server panicked", error))?;
+    served.map_err(|error| Failure::other("the server failed", error))?;
+    let all = all?;
     let mut small_pictures = Vec::new();
     for answered in &all {
         step(format!("drawing {}", answered.holdout.name));
@@ -143,6 +147,35 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 impl Arguments {
+    async fn ask(
+        &self,
+        url: String,
+        holdouts: Vec<&'static BuiltInHoldout>,
+        step: impl Fn(String),
+    ) -> Result<Vec<AnsweredHoldout>, Failure> {
+        let client = GraspClient::connect(url).await?;
+        // The first call of a connection exchanges settings; keep that out of the measured times.
+        client.health().await?;
+        if self.strategy == Strategy::Guided {
+            wait_for_atlases(&client).await?;
+        }
+        let mut all = Vec::new();
+        for holdout in holdouts {
+            step(format!("asking for {}", holdout.name));
+            let start = Instant::now();
+            let answer = client.find_grasp(&self.request(holdout)).await?;
+            let file = |extension: &str| self.out.join(format!("{}.{extension}", holdout.name));
+            all.push(AnsweredHoldout {
+                holdout,
+                answer,
+                round_trip: start.elapsed(),
+                picture: file("png"),
+                scene: file("glb"),
+            });
+        }
+        Ok(all)
+    }
+
     fn request(&self, holdout: &BuiltInHoldout) -> v1::FindGraspRequest {
         let mut request = request_for(holdout)
             .receiving(Handedness::Right)
@@ -215,10 +248,7 @@ fn describe(all: &[AnsweredHoldout]) -> String {
             _ => "none in time",
         };
         // Without the object, which has its own column.
-        let name = holdout
-            .name
-            .trim_start_matches(&holdout.object)
-            .trim_start_matches('-');
+        let name = holdout.name.trim_start_matches(&holdout.object);
         let rejections = answer.report.as_ref().map(rejections_at_a_glance);
         let (grasp_type, comfort) = answer.grasp().map_or_else(
             || ("-".to_owned(), "-".to_owned()),
@@ -229,7 +259,7 @@ fn describe(all: &[AnsweredHoldout]) -> String {
         );
         table.add_row([
             holdout.object.clone(),
-            name.to_owned(),
+            name.trim_start_matches('-').to_owned(),
             outcome.to_owned(),
             answer.attempts().to_string(),
             rejections.unwrap_or_default(),
@@ -254,53 +284,4 @@ async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-/// A running server inside this process, and a connected client.
-struct LocalServer {
-    client: GraspClient,
-    stop: oneshot::Sender<()>,
-    serving: JoinHandle<Result<(), ServeError>>,
-}
-
-impl LocalServer {
-    /// Starts a server on a free loopback port that allows searches of `budget`, and connects to it.
-    async fn start(budget: Duration) -> Result<Self, Failure> {
-        // Prefers IPv6, like the server's default; containers often have IPv4 only.
-        let addresses = [
-            SocketAddr::from((Ipv6Addr::LOCALHOST, 0)),
-            SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
-        ];
-        let failed = |error| Failure::other("cannot listen on the loopback interface", error);
-        let listener = TcpListener::bind(&addresses[..]).await.map_err(failed)?;
-        let address = listener.local_addr().map_err(failed)?;
-        let mut config = Config {
-            place: StorePlace::Memory,
-            ..Config::default()
-        };
-        config.budgets.maximum = config.budgets.maximum.max(budget);
-        let (stop, stopped) = oneshot::channel();
-        let serving = tokio::spawn(grasp_server::run(listener, config, async {
-            // A dropped sender stops the server, too.
-            let _ = stopped.await;
-        }));
-        let client = GraspClient::connect(format!("http://{address}")).await?;
-        // The first call of a connection exchanges settings; keep that out of the measured times.
-        client.health().await?;
-        Ok(Self {
-            client,
-            stop,
-            serving,
-        })
-    }
-
-    /// Closes the connection and waits until the server has stopped.
-    async fn stop(self) -> Result<(), Failure> {
-        drop(self.client);
-        // Fails if the server stopped by itself; its result says why.
-        let _ = self.stop.send(());
-        let served = self.serving.await;
-        let served = served.map_err(|error| Failure::other("the server panicked", error))?;
-        served.map_err(|error| Failure::other("the server failed", error))
-    }
 }

@@ -48,17 +48,12 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let client = arguments.server.connect().await?;
     let answer = client.evaluate_holdout(&request).await?;
     output.write_message(&answer, |answer| describe(&names, answer))?;
-    let can_be_taken = answer.ratings.iter().any(is_receivable);
+    // Nothing keeps hands from the object, not even something that only a newer server names.
+    let can_be_taken = answer.ratings.iter().any(|rating| rating.no_grasp == 0);
     Ok(Ending::found(can_be_taken))
 }
 
-/// Nothing keeps hands from the object, not even something that only a newer server names.
-fn is_receivable(rating: &v1::HoldoutRating) -> bool {
-    rating.no_grasp == 0
-}
-
 impl Arguments {
-    /// The names of the givers, and the request.
     async fn to_request(&self) -> Result<(Vec<String>, v1::EvaluateHoldoutRequest), Failure> {
         let mut names = self.holdout.clone();
         if self.request.is_some() {
@@ -85,10 +80,9 @@ impl Arguments {
 fn giver_of(name: &str, holdout: &v1::Holdout) -> Result<v1::PresentingHand, Failure> {
     let other = request_for(built_in(name)?).holdout.unwrap_or_default();
     if other.object != holdout.object {
-        return Err(Failure::usage(format!(
-            "holdout {name:?} is of {}, not of {}",
-            other.object, holdout.object
-        )));
+        let (other, object) = (&other.object, &holdout.object);
+        let wrong = format!("holdout {name:?} is of {other}, not of {object}");
+        return Err(Failure::usage(wrong));
     }
     let client_from_other = holdout.client_from_object() * other.client_from_object().inverse();
     match other.presenting_hand.and_then(|hand| hand.form) {
@@ -100,7 +94,6 @@ fn giver_of(name: &str, holdout: &v1::Holdout) -> Result<v1::PresentingHand, Fai
     }
 }
 
-/// The answer for people: givers from the best on.
 fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
     let mut ratings = table(
         "giver | can be taken | >valid | >known | >share | >best score | from (object's axes) | in the way of the others",
@@ -109,14 +102,12 @@ fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
         let name = names.get(rating.presenting_hand as usize);
         let known: u32 = rating.sides.iter().map(|side| side.known).sum();
         let valid: u32 = rating.sides.iter().map(|side| side.valid).sum();
-        let can_be_taken = if is_receivable(rating) {
-            "yes".to_owned()
-        } else {
-            name_of(rating.no_grasp())
-        };
         ratings.add_row([
             name.cloned().unwrap_or_default(),
-            can_be_taken,
+            match rating.no_grasp {
+                0 => "yes".to_owned(),
+                _ => name_of(rating.no_grasp()),
+            },
             valid.to_string(),
             known.to_string(),
             percent(valid.into(), known),
@@ -137,7 +128,6 @@ fn percent(count: u64, known: u32) -> String {
     format!("{:.0} %", 100.0 * count as f64 / f64::from(known.max(1)))
 }
 
-/// The sides with valid grasps, most first.
 fn sides(rating: &v1::HoldoutRating) -> String {
     let mut free: Vec<_> = rating.sides.iter().filter(|side| side.valid > 0).collect();
     free.sort_by_key(|side| std::cmp::Reverse(side.valid));
@@ -147,7 +137,6 @@ fn sides(rating: &v1::HoldoutRating) -> String {
     }))
 }
 
-/// The name of a direction along an axis.
 fn axis(direction: Vec3) -> &'static str {
     let axis = direction.abs().max_position();
     let names = [["-x", "+x"], ["-y", "+y"], ["-z", "+z"]];

@@ -4,9 +4,10 @@ use std::{
     error::Error,
     io::{self, Write as _},
     process::ExitCode,
+    time::Duration,
 };
 
-use grasp_client::{BoxError, CallError, ClientError, FieldViolation, code_name};
+use grasp_client::{BoxError, CallError, ClientError, Code, FieldViolation, code_name};
 use grasp_scene::CannotDraw;
 use serde_json::{Value, json};
 
@@ -18,7 +19,6 @@ pub(crate) struct Failure {
     kind: String,
     /// The error, with its causes, in one line. Violations are listed separately.
     pub(crate) message: String,
-    /// The call that failed, if one did.
     call: Option<Box<CallError>>,
 }
 
@@ -27,16 +27,19 @@ impl From<ClientError> for Failure {
         let (exit_code, kind) = match &error {
             ClientError::Endpoint { .. } => (2, "endpoint"),
             ClientError::Connect { .. } => (5, "connect"),
-            ClientError::Malformed { .. } => (1, "malformed_answer"),
-            ClientError::InvalidArgument(call)
-            | ClientError::NotFound(call)
-            | ClientError::AlreadyExists(call)
-            | ClientError::FailedPrecondition(call)
-            | ClientError::Aborted(call) => (4, code_name(call.code)),
-            ClientError::Unavailable(call)
-            | ClientError::ResourceExhausted(call)
-            | ClientError::DeadlineExceeded(call) => (5, code_name(call.code)),
-            _ => (1, "call"),
+            ClientError::Malformed(_) => (1, "malformed_answer"),
+            ClientError::Call(call) => match call.code {
+                Code::InvalidArgument
+                | Code::NotFound
+                | Code::AlreadyExists
+                | Code::FailedPrecondition
+                | Code::Aborted => (4, code_name(call.code)),
+                Code::Unavailable | Code::ResourceExhausted | Code::DeadlineExceeded => {
+                    (5, code_name(call.code))
+                }
+                _ => (1, "call"),
+            },
+            _ => (1, "other"),
         };
         let message = match error.call() {
             Some(call) if call.attempts > 1 => format!("{} (tried {} times)", call.message, call.attempts),
@@ -85,7 +88,6 @@ impl Failure {
         Self::new(1, "other", message)
     }
 
-    /// The user pressed Ctrl-C.
     pub(crate) fn interrupted() -> Self {
         Self::new(130, "interrupted", "interrupted")
     }
@@ -110,7 +112,7 @@ impl Failure {
             return format!("error: {message}");
         };
         // A message that contains the first violation would repeat the list below it.
-        let violations = &call.details.field_violations;
+        let violations = call.violations();
         let first = violations.first();
         let repeats = first.is_some_and(|first| message.contains(&first.description));
         let mut lines = vec![match violations.len() {
@@ -118,16 +120,18 @@ impl Failure {
             count if repeats => format!("error: the request has {count} fields wrong"),
             _ => format!("error: {message}"),
         }];
-        for FieldViolation { field, description } in violations {
-            lines.push(format!("{field}: {description}"));
-        }
-        if let Some(resource) = &call.details.resource
-            && !call.message.contains(&resource.name)
+        lines.extend(
+            violations
+                .iter()
+                .map(|wrong| format!("{}: {}", wrong.field, wrong.description)),
+        );
+        if let Some(resource) = call.details.resource_info()
+            && !call.message.contains(&resource.resource_name)
         {
-            let (kind, name) = (&resource.kind, &resource.name);
+            let (kind, name) = (&resource.resource_type, &resource.resource_name);
             lines.push(format!("{kind} {name}: {}", resource.description));
         }
-        let delay = call.details.retry_delay;
+        let delay = retry_delay(call);
         lines.extend(delay.map(|delay| format!("try again in {delay:?}")));
         lines.join("\n  ")
     }
@@ -139,14 +143,27 @@ impl Failure {
         if let Some(call) = &self.call {
             error["code"] = json!(code_name(call.code));
             error["attempts"] = json!(call.attempts);
-            error["reason"] = json!(call.details.reason);
-            error["metadata"] = json!(call.details.metadata);
-            error["field_violations"] = json!(call.details.field_violations);
-            error["resource"] = json!(call.details.resource);
-            error["retry_delay_seconds"] = json!(call.details.retry_delay.map(|delay| delay.as_secs_f64()));
+            let info = call.details.error_info();
+            error["reason"] = json!(info.map(|info| &info.reason));
+            error["metadata"] = info.map_or(json!({}), |info| json!(info.metadata));
+            let violation =
+                |FieldViolation {
+                     field, description, ..
+                 }: &_| { json!({ "field": field, "description": description }) };
+            error["field_violations"] = call.violations().iter().map(violation).collect();
+            let resource = call.details.resource_info().map(|resource| {
+                let (kind, name) = (&resource.resource_type, &resource.resource_name);
+                json!({ "type": kind, "name": name, "description": resource.description })
+            });
+            error["resource"] = json!(resource);
+            error["retry_delay_seconds"] = json!(retry_delay(call).map(|delay| delay.as_secs_f64()));
         }
         json!({ "error": error })
     }
+}
+
+fn retry_delay(call: &CallError) -> Option<Duration> {
+    call.details.retry_info().and_then(|info| info.retry_delay)
 }
 
 /// Reports an invalid command line, or prints help or version.

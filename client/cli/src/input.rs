@@ -74,7 +74,6 @@ pub(crate) fn read_json<T: DeserializeOwned>(what: &str, path: &Path) -> Result<
         .map_err(|error| Failure::usage(format!("{what} {}: {error}", path.display())))
 }
 
-/// Reads all of a file.
 pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     std::fs::read(path).map_err(|error| Failure::other(format!("cannot read {}", path.display()), error))
 }
@@ -92,7 +91,6 @@ pub(crate) struct HoldoutOptions {
 }
 
 impl HoldoutOptions {
-    /// The request of the built-in holdout or of the file.
     pub(crate) async fn to_request(&self) -> Result<v1::FindGraspRequest, Failure> {
         match (&self.holdout, self.request.clone()) {
             (Some(name), _) => Ok(request_for(built_in(name)?)),
@@ -136,7 +134,6 @@ pub(crate) struct ServerOptions {
 }
 
 impl ServerOptions {
-    /// Connects to the server.
     pub(crate) async fn connect(&self) -> Result<GraspClient, ClientError> {
         GraspClient::builder(&self.server)
             .connect_timeout(self.connect_timeout)
@@ -163,9 +160,8 @@ pub(crate) fn built_in(name: &str) -> Result<&'static BuiltInHoldout, Failure> {
 /// Parses a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
 pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     let expected = || format!("{text:?} is not a duration; write for example 500ms, 2s or 1m, more than 0");
-    duration(text)
-        .filter(|duration| !duration.is_zero())
-        .ok_or_else(expected)
+    let duration = duration(text).filter(|duration| !duration.is_zero());
+    duration.ok_or_else(expected)
 }
 
 fn duration(text: &str) -> Option<Duration> {
@@ -225,7 +221,6 @@ pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
 /// A value that is given by name: the name, the value, and what help pages say about it.
 pub(crate) type Choice<T> = (&'static str, T, &'static str);
 
-/// Parses the name of one of some values.
 pub(crate) fn one_of<T, const COUNT: usize>(values: [Choice<T>; COUNT]) -> impl TypedValueParser<Value = T>
 where
     T: Copy + Send + Sync + 'static,
@@ -253,7 +248,6 @@ pub(crate) const STRATEGIES: [Choice<Strategy>; 7] = [
     ),
 ];
 
-/// The hand to pose.
 pub(crate) const HANDS: [Choice<Handedness>; 3] = [
     ("left", Handedness::Left, "The left hand"),
     ("right", Handedness::Right, "The right hand"),
@@ -296,12 +290,9 @@ mod tests {
         let vectors = [("0, 0.5,-2", Vec3::new(0.0, 0.5, -2.0))];
         check(parse_vector, vectors, "|1,2|1,2,3,4|a,b,c|1;2;3");
         let (width, height) = (900, 700);
+        let sizes = [("900x700", ViewSize { width, height })];
         let rejected = "|900|900x|x700|15x700|900x8193|900x700x3|-900x700";
-        check(
-            parse_view_size,
-            [("900x700", ViewSize { width, height })],
-            rejected,
-        );
+        check(parse_view_size, sizes, rejected);
     }
 
     #[test]

@@ -88,7 +88,6 @@ enum Ending {
 }
 
 impl Ending {
-    /// The outcome of what finds a grasp or not.
     fn found(is_found: bool) -> Self {
         if is_found { Self::Done } else { Self::NoGrasp }
     }

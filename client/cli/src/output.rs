@@ -2,6 +2,7 @@
 
 use std::{
     cmp::Reverse,
+    fmt::{Debug, Display},
     fs,
     io::{self, Write as _},
     path::Path,
@@ -57,7 +58,6 @@ impl Output {
     }
 }
 
-/// Writes a message as protobuf's JSON.
 pub(crate) fn write_message<M: Message + Name>(message: &M) -> Result<(), Failure> {
     write_json(&message_json(message)?)
 }
@@ -67,26 +67,22 @@ pub(crate) fn write_message_line<M: Message + Name>(message: &M) -> Result<(), F
     write_line(&message_json(message)?.to_string())
 }
 
-/// A message as protobuf's JSON.
 pub(crate) fn message_json<M: Message + Name>(message: &M) -> Result<Value, Failure> {
     to_json(message).map_err(|error| Failure::other("cannot write the result as JSON", error))
 }
 
-/// Writes `value` as JSON.
 pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
     write_line(&text)
 }
 
-/// Writes raw bytes to standard output.
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     let written = out.write_all(bytes).and_then(|()| out.flush());
     written.map_err(|error| Failure::output(&error))
 }
 
-/// Writes a line of text.
 pub(crate) fn write_line(text: &str) -> Result<(), Failure> {
     write_bytes(format!("{text}\n").as_bytes())
 }
@@ -123,7 +119,6 @@ pub(crate) fn pairs(pairs: &[(&str, String)]) -> String {
     joined("\n", pairs.map(|(name, value)| format!("{name:width$}  {value}")))
 }
 
-/// Warnings as pairs.
 pub(crate) fn warnings(warnings: &[String]) -> impl Iterator<Item = (&'static str, String)> {
     warnings.iter().map(|warning| ("warning", warning.clone()))
 }
@@ -142,39 +137,16 @@ pub(crate) fn bar(steps: u64, counts: &str) -> ProgressBar {
     bar
 }
 
-/// An enumeration of the contract.
-pub(crate) trait Named {
-    /// The value's name in the contract, without the enumeration's.
-    fn contract_name(self) -> &'static str;
-}
-
-macro_rules! named {
-    ($($enumeration:ident $prefix:literal)*) => {$(
-        impl Named for v1::$enumeration {
-            fn contract_name(self) -> &'static str {
-                let name = self.as_str_name();
-                name.strip_prefix($prefix).unwrap_or(name)
-            }
+/// The name of a value of one of the contract's enumerations, in words.
+pub(crate) fn name_of(value: impl Copy + Debug) -> String {
+    let mut words = String::new();
+    for letter in format!("{value:?}").chars() {
+        if !words.is_empty() && !letter.is_lowercase() {
+            words.push(' ');
         }
-    )*};
-}
-
-named! {
-    AtlasGrowth "ATLAS_GROWTH_"
-    Check "CHECK_"
-    CurrentGraspStatus "CURRENT_GRASP_STATUS_"
-    Digit "DIGIT_"
-    GraspSource "GRASP_SOURCE_"
-    GraspType "GRASP_TYPE_"
-    Handedness "HANDEDNESS_"
-    KeyFrameKind "KEY_FRAME_KIND_"
-    ObjectChange "OBJECT_CHANGE_"
-    Preference "PREFERENCE_"
-}
-
-/// The name of an enumeration's value, in words.
-pub(crate) fn name_of(value: impl Named) -> String {
-    value.contract_name().to_lowercase().replace('_', " ")
+        words.extend(letter.to_lowercase());
+    }
+    words
 }
 
 /// Texts with commas in between.
@@ -188,12 +160,10 @@ pub(crate) fn joined<T: ToString>(separator: &str, texts: impl IntoIterator<Item
     texts.join(separator)
 }
 
-/// Whether something is so.
 pub(crate) fn yes_or_no(is_so: bool) -> String {
     if is_so { "yes" } else { "no" }.to_owned()
 }
 
-/// The taxonomy's name of a grasp.
 pub(crate) fn grasp_type_name(grasp: &v1::Grasp) -> String {
     match grasp.r#type() {
         v1::GraspType::Unspecified => "unclassifiable".to_owned(),
@@ -228,25 +198,26 @@ pub(crate) fn human_time(seconds: f64) -> String {
 
 /// The three most frequent rejections, abbreviated, with their percentage of the attempts.
 pub(crate) fn rejections_at_a_glance(report: &v1::SearchReport) -> String {
-    rejections(report, 3, |check| {
-        let name = match check {
-            Check::Contacts => "no contacts",
-            Check::Thumb => "no thumb",
-            Check::ThumbEarly => "early stop",
-            Check::Fingers => "no fingers",
-            Check::PalmCollision => "palm",
-            Check::FingerCollision => "finger",
-            Check::Forbidden => "unwanted",
-            Check::Balance => "not immobile",
-            Check::Requirements => "requirement",
-            _ => "other",
-        };
-        name.to_owned()
+    rejections(report, 3, |check| match check {
+        Check::Contacts => "no contacts",
+        Check::Thumb => "no thumb",
+        Check::ThumbEarly => "early stop",
+        Check::Fingers => "no fingers",
+        Check::PalmCollision => "palm",
+        Check::FingerCollision => "finger",
+        Check::Forbidden => "unwanted",
+        Check::Balance => "not immobile",
+        Check::Requirements => "requirement",
+        _ => "other",
     })
 }
 
 /// The most frequent rejections with their percentage of the attempts.
-pub(crate) fn rejections(report: &v1::SearchReport, most: usize, name: impl Fn(Check) -> String) -> String {
+pub(crate) fn rejections<N: Display>(
+    report: &v1::SearchReport,
+    most: usize,
+    name: impl Fn(Check) -> N,
+) -> String {
     let mut counts: Vec<_> = report.rejections.iter().filter(|count| count.count > 0).collect();
     counts.sort_by_key(|count| Reverse(count.count));
     if counts.is_empty() {
@@ -263,40 +234,42 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_have_three_significant_digits() {
-        assert_eq!(human_time(0.0), "0.00 µs");
-        assert_eq!(human_time(0.000_012_345), "12.3 µs");
-        assert_eq!(human_time(0.001_234_5), "1.23 ms");
-        assert_eq!(human_time(0.123_45), "123 ms");
-        assert_eq!(human_time(9.999), "10.0 s");
-        assert_eq!(human_time(12.0), "12.0 s");
+    fn times_have_three_significant_digits_and_values_names_in_words() {
+        for (seconds, expected) in [
+            (0.0, "0.00 µs"),
+            (0.000_012_345, "12.3 µs"),
+            (0.001_234_5, "1.23 ms"),
+            (0.123_45, "123 ms"),
+            (9.999, "10.0 s"),
+        ] {
+            assert_eq!(human_time(seconds), expected);
+        }
+        assert_eq!(name_of(v1::GraspType::Prismatic4Finger), "prismatic 4 finger");
     }
 
     #[test]
     fn most_frequent_rejections_come_first() {
-        let count = |check: Check, count| v1::CheckCount {
+        let count = |(check, count): (Check, u64)| v1::CheckCount {
             check: check.into(),
             count,
         };
-        let mut report = v1::SearchReport {
+        let counts = [
+            (Check::Contacts, 20),
+            (Check::PalmCollision, 130),
+            (Check::Thumb, 1),
+        ];
+        let report = v1::SearchReport {
             attempts: 200,
-            rejections: vec![
-                count(Check::Contacts, 20),
-                count(Check::PalmCollision, 130),
-                count(Check::Thumb, 0),
-                count(Check::Balance, 50),
-            ],
+            rejections: counts
+                .into_iter()
+                .chain([(Check::Balance, 50)])
+                .map(count)
+                .collect(),
             ..v1::SearchReport::default()
         };
         let at_a_glance = rejections_at_a_glance(&report);
         assert_eq!(at_a_glance, "palm 65%, not immobile 25%, no contacts 10%");
-        report.rejections[2].count = 1;
-        assert_eq!(rejections_at_a_glance(&report), at_a_glance);
-        assert_eq!(
-            rejections(&report, 9, name_of),
-            "palm collision 65%, balance 25%, contacts 10%, thumb 0%"
-        );
-        report.rejections.clear();
-        assert_eq!(rejections(&report, 9, name_of), "none");
+        let all = rejections(&report, 9, name_of);
+        assert_eq!(all, "palm collision 65%, balance 25%, contacts 10%, thumb 0%");
     }
 }

@@ -96,16 +96,14 @@ pub(crate) async fn run(Arguments { command, server }: Arguments, output: Output
 
 async fn create(arguments: CreateArguments, server: &ServerOptions, output: Output) -> Result<(), Failure> {
     let files = std::iter::once(&arguments.model).chain(&arguments.other_model);
-    let joints = arguments.joint.into_iter();
+    let joints = arguments.joint.into_iter().map(|(node, joint)| v1::RigNode {
+        node,
+        joint,
+        ..v1::RigNode::default()
+    });
     let request = v1::CreateRigRequest {
         models: files.map(|file| read_file(file)).collect::<Result<_, _>>()?,
-        joint_map: joints
-            .map(|(node, joint)| v1::RigNode {
-                node,
-                joint,
-                ..v1::RigNode::default()
-            })
-            .collect(),
+        joint_map: joints.collect(),
         handedness: arguments.hand.unwrap_or_default().into(),
         width_scale: arguments.width_scale,
         radii: arguments.radius.into_iter().collect(),
@@ -118,12 +116,10 @@ async fn create(arguments: CreateArguments, server: &ServerOptions, output: Outp
 
 /// The node and the joint of NODE=JOINT; names of nodes may contain the sign.
 fn parse_joint(text: &str) -> Result<(String, String), String> {
-    match text.rsplit_once('=') {
-        Some((node, joint)) if !node.is_empty() && !joint.is_empty() => {
-            Ok((node.to_owned(), joint.to_owned()))
-        }
-        _ => Err("must be NODE=JOINT".to_owned()),
-    }
+    let parts = text.rsplit_once('=');
+    let parts = parts.filter(|(node, joint)| !node.is_empty() && !joint.is_empty());
+    let parts = parts.map(|(node, joint)| (node.to_owned(), joint.to_owned()));
+    parts.ok_or_else(|| "must be NODE=JOINT".to_owned())
 }
 
 /// The joint and the metres of JOINT=METRES.
@@ -169,7 +165,6 @@ fn length(hand: &v1::RigHand) -> String {
     format!("{:.0} mm", 1000.0 * lengths.into_iter().fold(0.0, f32::max))
 }
 
-/// Everything about a rig, for people.
 fn describe(rig: &v1::HandRig) -> String {
     let mut lines = vec![("name", rig.name.clone()), ("built in", yes_or_no(rig.built_in))];
     for hand in &rig.hands {

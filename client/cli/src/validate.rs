@@ -82,7 +82,6 @@ fn grasp(given: &Value) -> Result<Grasp, Failure> {
     request.grasp.ok_or_else(none)
 }
 
-/// The answer for people.
 fn describe(answer: &v1::ValidateGraspResponse) -> String {
     let mut verdicts = table(" | check | >figure | >bound | what it is");
     let number = |number: Option<f32>| number.map_or_else(String::new, |number| format!("{number:.4}"));

@@ -35,9 +35,8 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// The closest camera that sees all points, looking against `direction` (from the scene to the camera); without points it
-    /// looks at the origin from 1 m away. `up` is up in the picture, as far as `direction` allows. `aspect` is the width of the
-    /// picture divided by its height.
+    /// The closest camera that sees all points, looking against `direction` (from the scene to the camera). `up` is up in the
+    /// picture, as far as `direction` allows. `aspect` is the width of the picture divided by its height.
     pub(crate) fn framing(
         points: impl IntoIterator<Item = Vec3>,
         direction: Vec3,
@@ -61,17 +60,12 @@ impl Camera {
             lower = lower.max(-p.truncate() + inner * p.z);
             nearest = nearest.max(p.z);
         }
-        let position = if nearest.is_finite() {
-            let centre = (upper - lower) * 0.5;
-            let distances = (upper + lower) / (2.0 * inner);
-            let z = distances.max_element().max(nearest + MIN_DISTANCE);
-            orientation * centre.extend(z)
-        } else {
-            orientation * Vec3::Z
-        };
+        let centre = (upper - lower) * 0.5;
+        let distances = (upper + lower) / (2.0 * inner);
+        let z = distances.max_element().max(nearest + MIN_DISTANCE);
         Self {
             world_from_camera: Pose {
-                position,
+                position: orientation * centre.extend(z),
                 orientation,
             },
             tangents,

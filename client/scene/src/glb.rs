@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use glam::{Mat4, Quat, Vec3};
+use gltf::binary::{Glb, Header};
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Skin, SkinJoint, index},
@@ -17,12 +18,7 @@ use crate::{
 /// Emission of a marker as a share of its colour: keeps it visible in a viewer's shadows.
 const MARKER_EMISSION: f32 = 0.45;
 
-/// `glTF` in little-endian, and the types of chunks (4.4 of the Khronos glTF 2.0 specification).
-const MAGIC: u32 = 0x4654_6C67;
-const JSON_CHUNK: u32 = 0x4E4F_534A;
-const BIN_CHUNK: u32 = 0x004E_4942;
-
-/// Component types (3.6.2 of the specification).
+/// Component types (3.6.2 of the Khronos glTF 2.0 specification).
 const UNSIGNED_BYTE: u32 = 5121;
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
@@ -32,9 +28,6 @@ const SAME_SCALE: f32 = 1e-5;
 
 /// Parts as a GLB file: each part with triangles becomes a named node with its own mesh and material, in metres and
 /// +Y up. Vertices have the same smooth normals as in pictures.
-///
-/// # Panics
-/// The file exceeds 4 GiB.
 pub(crate) fn to_glb(parts: &[Part]) -> Vec<u8> {
     let mut writer = Writer::default();
     for part in parts.iter().filter(|part| !part.triangles.is_empty()) {
@@ -48,9 +41,7 @@ pub(crate) fn to_glb(parts: &[Part]) -> Vec<u8> {
 pub(crate) struct MovingHand {
     /// Start of the names of its parts, such as `giver`; each hand has its own.
     pub(crate) name: String,
-    /// Whose it is.
     pub(crate) person: Person,
-    /// The skin to pose.
     pub(crate) skin: &'static Skin,
     /// The joints at each moment, in the client's frame; `None` when the hand is not there.
     pub(crate) joints: Vec<Option<HandJoints>>,
@@ -65,7 +56,6 @@ pub(crate) struct MovingHandover {
     pub(crate) times: Vec<f32>,
     /// Pose of the object at each moment.
     pub(crate) client_from_object: Vec<Pose>,
-    /// The hands.
     pub(crate) hands: Vec<MovingHand>,
 }
 
@@ -76,7 +66,7 @@ pub(crate) struct MovingHandover {
 /// that is not there has no size.
 ///
 /// # Panics
-/// The file exceeds 4 GiB, or there is not one pose of the object and of each hand per moment.
+/// There is not one pose of the object and of each hand per moment.
 pub(crate) fn to_moving_glb(handover: &MovingHandover) -> Vec<u8> {
     assert_eq!(handover.client_from_object.len(), handover.times.len());
     let mut writer = Writer::default();
@@ -95,7 +85,6 @@ pub(crate) fn to_moving_glb(handover: &MovingHandover) -> Vec<u8> {
     writer.finish()
 }
 
-/// The nodes added so far, and what they need.
 #[derive(Default)]
 struct Writer {
     nodes: Vec<Value>,
@@ -173,7 +162,6 @@ impl Writer {
         self.meshes.len() - 1
     }
 
-    /// An accessor of rows of numbers.
     fn floats<const N: usize>(&mut self, rows: &[[f32; N]], kind: &str) -> usize {
         let bytes = rows.as_flattened().iter().flat_map(|value| value.to_le_bytes());
         self.add(bytes, rows.len(), FLOAT, kind)
@@ -214,10 +202,8 @@ impl Writer {
         let Some(postures) = filled(&hand.joints) else {
             return;
         };
-        let moved: Vec<[SkinJoint; JOINT_COUNT]> = postures
-            .iter()
-            .map(|joints| hand.skin.joints_at(joints))
-            .collect();
+        let moved = postures.iter().map(|joints| hand.skin.joints_at(joints));
+        let moved: Vec<[SkinJoint; JOINT_COUNT]> = moved.collect();
         let joints: Vec<usize> = (0..JOINT_COUNT)
             .map(|joint| {
                 let node = self.add_node(json!({"name": format!("{}_{}", hand.name, JOINT_NAMES[joint])}));
@@ -292,7 +278,6 @@ impl Writer {
         self.add_root(json!({"name": name, "mesh": mesh, "skin": skin}));
     }
 
-    /// The sleeve in the frame of the wrist.
     fn add_sleeve(&mut self, hand: &MovingHand) -> usize {
         let name = format!("{}_sleeve", hand.name);
         let mut part = hand.person.sleeve(&name, &hand.skin.bind, &hand.skin.positions);
@@ -328,21 +313,18 @@ impl Writer {
             document["animations"] =
                 json!([{"name": "handover", "samplers": self.samplers, "channels": self.channels}]);
         }
-        let mut text = document.to_string().into_bytes();
-        text.resize(text.len().next_multiple_of(4), b' ');
-        let mut chunks = vec![(JSON_CHUNK, text)];
-        if !self.buffer.is_empty() {
-            chunks.push((BIN_CHUNK, self.buffer));
-        }
-        let total = 12 + chunks.iter().map(|(_, data)| 8 + data.len()).sum::<usize>();
-        let length = |bytes: usize| u32::try_from(bytes).expect("a GLB file is smaller than 4 GiB");
-        let mut file = [MAGIC, 2, length(total)].map(u32::to_le_bytes).concat();
-        for (kind, data) in chunks {
-            file.extend(length(data.len()).to_le_bytes());
-            file.extend(kind.to_le_bytes());
-            file.extend(data);
-        }
-        file
+        let header = Header {
+            magic: *b"glTF",
+            version: 2,
+            length: 0,
+        };
+        let file = Glb {
+            // Its length is computed when it is written.
+            header,
+            json: document.to_string().into_bytes().into(),
+            bin: (!self.buffer.is_empty()).then(|| self.buffer.into()),
+        };
+        file.to_vec().expect("writing to memory cannot fail")
     }
 }
 

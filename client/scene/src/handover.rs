@@ -14,6 +14,7 @@ use crate::{
     parts::{Finish, Part, arrow, linear_from_srgb, sphere},
     people::{ArmJoints, Person},
     render::{Stage, ViewSize, render},
+    track::numbered,
 };
 
 /// Radius of a contact's marker, and distance of its centre from the surface, in metres.
@@ -120,7 +121,7 @@ impl Handover {
 fn contact_parts(contacts: &[v1::Contact]) -> Vec<Part> {
     let forces = contacts.iter().map(|contact| contact.force().length());
     let largest = forces.fold(MIN_FORCE, f32::max);
-    let mut times_used: HashMap<String, u32> = HashMap::new();
+    let mut times_used: HashMap<String, usize> = HashMap::new();
     let mut parts = Vec::new();
     for contact in contacts {
         let (position, force) = (contact.position(), contact.force());
@@ -138,11 +139,9 @@ fn contact_parts(contacts: &[v1::Contact]) -> Vec<Part> {
             (Some(digit), None) => digit.clone(),
             (Some(digit), Some(phalanx)) => format!("{digit}_{phalanx}"),
         };
-        let times = times_used.entry(label.clone()).or_default();
-        *times += 1;
-        if *times > 1 {
-            label = format!("{label}_{times}");
-        }
+        let before = times_used.entry(label.clone()).or_default();
+        label = numbered(&label, *before);
+        *before += 1;
         let newtons = force.length();
         let extras = json!({
             "digit": digit,

@@ -34,7 +34,6 @@ const MODEL_LIMITS: MeshLimits = MeshLimits {
 #[derive(Clone, Debug)]
 pub(crate) struct PosedHand {
     pub(crate) skin: &'static Skin,
-    /// The joints, in the client's frame.
     pub(crate) joints: HandJoints,
 }
 
@@ -90,9 +89,8 @@ pub(crate) fn receiver(hand: &v1::HandPose) -> Result<PosedHand, CannotDraw> {
             "the receiving hand cannot be drawn: the answer has only its wrist".to_owned(),
         ));
     }
-    let built_in = built_in(&hand.rig, hand.handedness())?;
     let joints = hand.posed_joints().map(|posed| joint(posed.unwrap_or_default()));
-    Ok(with_joints(built_in, &joints))
+    with_joints(&hand.rig, hand.handedness(), &joints)
 }
 
 /// The receiving hand of an answer with the skin of the model that its rig was created from.
@@ -128,14 +126,20 @@ pub(crate) fn skin_of_model(model: &[u8], hand: &v1::HandPose, name: String) -> 
     Ok(Part::new(name, skin.positions, skin.triangles, colour))
 }
 
-fn with_joints(hand: &'static hands::Hand, joints: &[Joint; JOINT_COUNT]) -> PosedHand {
-    PosedHand {
-        skin: &hand.skin,
+fn with_joints(
+    rig: &str,
+    side: v1::Handedness,
+    joints: &[Joint; JOINT_COUNT],
+) -> Result<PosedHand, CannotDraw> {
+    let hands::Hand { rig, skin } = built_in(rig, side)?;
+    let handedness = rig.handedness;
+    Ok(PosedHand {
+        skin,
         joints: HandJoints {
-            handedness: hand.rig.handedness,
+            handedness,
             joints: *joints,
         },
-    }
+    })
 }
 
 fn from_angles(hand: &v1::HandPose, client_from_object: v1::Pose) -> Result<PosedHand, CannotDraw> {
@@ -148,13 +152,10 @@ fn from_angles(hand: &v1::HandPose, client_from_object: v1::Pose) -> Result<Pose
         ));
     }
     let at_object = hand.object_from_wrist.map(|wrist| client_from_object * wrist);
-    let built_in = built_in(&hand.rig, hand.handedness())?;
-    let rig = built_in.rig.scaled(hand.size());
     let wrist = synthesis_pose(hand.client_from_wrist.or(at_object));
-    Ok(PosedHand {
-        skin: &built_in.skin,
-        joints: posed(&rig, wrist, synthesis_digits(hand)),
-    })
+    let hands::Hand { rig, skin } = built_in(&hand.rig, hand.handedness())?;
+    let joints = posed(&rig.scaled(hand.size()), wrist, synthesis_digits(hand));
+    Ok(PosedHand { skin, joints })
 }
 
 /// The joints of a rig whose wrist is at an `OpenXR` joint frame.
@@ -166,7 +167,6 @@ pub(crate) fn posed(rig: &Rig, wrist: Pose, digits: [DigitAngles; 5]) -> HandJoi
     HandJoints::of_pose(rig, &pose)
 }
 
-/// A hand's angles as the core's.
 pub(crate) fn synthesis_digits(hand: &v1::HandPose) -> [DigitAngles; 5] {
     hand.digits().map(|digit| {
         let digit = digit.copied().unwrap_or_default();
@@ -190,10 +190,7 @@ fn from_tracked(hand: &v1::HandJoints) -> Result<PosedHand, CannotDraw> {
     let joints: [Joint; JOINT_COUNT] = joints.try_into().map_err(|_| {
         CannotDraw("the presenting hand cannot be drawn: it has the wrong number of joints".to_owned())
     })?;
-    Ok(with_joints(
-        built_in(TRACKED_HAND_RIG, hand.handedness())?,
-        &joints,
-    ))
+    with_joints(TRACKED_HAND_RIG, hand.handedness(), &joints)
 }
 
 fn joint(joint: v1::JointPose) -> Joint {

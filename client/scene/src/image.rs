@@ -9,9 +9,6 @@ const GLYPH_HEIGHT: usize = 9;
 /// Dots from one glyph to the next.
 const ADVANCE: usize = GLYPH_WIDTH + 1;
 
-/// The first character that has a glyph; the others follow in the order of ASCII.
-const FIRST: char = ' ';
-
 /// Grey of captions and gaps, sRGB.
 const PAPER: u8 = 250;
 const INK: u8 = 40;
@@ -35,13 +32,9 @@ pub struct Image {
 }
 
 impl Image {
-    /// An image from its pixels' bytes, 3 × width × height.
-    pub(crate) fn from_rgb(width: usize, height: usize, rgb: Vec<u8>) -> Self {
-        Self { width, height, rgb }
-    }
-
     fn blank(width: usize, height: usize) -> Self {
-        Self::from_rgb(width, height, vec![PAPER; width * height * 3])
+        let rgb = vec![PAPER; width * height * 3];
+        Self { width, height, rgb }
     }
 
     /// The image as a PNG file.
@@ -65,25 +58,15 @@ impl Image {
         let text_width = text_width(caption) * CAPTION_SCALE;
         let left = self.width.saturating_sub(text_width) / 2;
         let top = self.height + (CAPTION_HEIGHT - GLYPH_HEIGHT * CAPTION_SCALE) / 2;
-        for_each_dot(caption, |dot_x, dot_y| {
-            for y in 0..CAPTION_SCALE {
-                for x in 0..CAPTION_SCALE {
-                    image.set(
-                        left + dot_x * CAPTION_SCALE + x,
-                        top + dot_y * CAPTION_SCALE + y,
-                        [INK; 3],
-                    );
-                }
+        for (dot_x, dot_y) in dots(caption) {
+            let start = left + dot_x * CAPTION_SCALE;
+            let end = self.width.min(start + CAPTION_SCALE);
+            for row in 0..CAPTION_SCALE {
+                let line = (top + dot_y * CAPTION_SCALE + row) * self.width;
+                image.rgb[3 * (line + start.min(end))..3 * (line + end)].fill(INK);
             }
-        });
-        image
-    }
-
-    fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
-        if x < self.width && y < self.height {
-            let at = (y * self.width + x) * 3;
-            self.rgb[at..at + 3].copy_from_slice(&colour);
         }
+        image
     }
 
     /// Copies another image, which must fit.
@@ -114,29 +97,25 @@ pub fn contact_sheet(images: &[(Image, String)], columns: usize) -> Option<Image
     Some(sheet)
 }
 
-/// Width of a text in dots.
 fn text_width(text: &str) -> usize {
     (text.chars().count() * ADVANCE).saturating_sub(1)
 }
 
-/// Calls `draw(x, y)` for every dot of a text, from its upper left corner.
-fn for_each_dot(text: &str, mut draw: impl FnMut(usize, usize)) {
-    for (index, character) in text.chars().enumerate() {
+/// The dots of a text, from its upper left corner.
+fn dots(text: &str) -> impl Iterator<Item = (usize, usize)> {
+    const COUNT: usize = GLYPH_WIDTH * GLYPH_HEIGHT;
+    text.chars().enumerate().flat_map(|(index, character)| {
         let glyph = glyph(character);
-        for dot in 0..GLYPH_WIDTH * GLYPH_HEIGHT {
-            if glyph >> (GLYPH_WIDTH * GLYPH_HEIGHT - 1 - dot) & 1 == 1 {
-                draw(index * ADVANCE + dot % GLYPH_WIDTH, dot / GLYPH_WIDTH);
-            }
-        }
-    }
+        let dots = (0..COUNT).filter(move |dot| glyph >> (COUNT - 1 - dot) & 1 == 1);
+        dots.map(move |dot| (index * ADVANCE + dot % GLYPH_WIDTH, dot / GLYPH_WIDTH))
+    })
 }
 
 /// The rows of a character from its top, of [`GLYPH_WIDTH`] bits each, in the lowest bits; the leftmost dot of a row and the first row are
 /// the highest. "?" stands for characters without a glyph.
 fn glyph(character: char) -> u64 {
-    let index = |c: char| (c as usize).checked_sub(FIRST as usize);
-    let known = |c: char| index(c).and_then(|index| GLYPHS.get(index)).copied();
-    known(character).or_else(|| known('?')).unwrap_or_default()
+    let is_known = (' '..='~').contains(&character);
+    GLYPHS[if is_known { character } else { '?' } as usize - ' ' as usize]
 }
 
 /// The glyphs of printable ASCII in its order.
@@ -164,36 +143,21 @@ const GLYPHS: [u64; 95] = [
 mod tests {
     use super::*;
 
-    fn gradient(width: usize, height: usize) -> Image {
-        let rgb = (0..width * height)
-            .flat_map(|i| [(i % 251) as u8, (i / 3 % 256) as u8, 90])
-            .collect();
-        Image::from_rgb(width, height, rgb)
-    }
-
     fn pixel(image: &Image, x: usize, y: usize) -> &[u8] {
         &image.rgb[(y * image.width + x) * 3..][..3]
     }
 
     #[test]
-    fn png_decodes_to_the_same_pixels() {
-        let image = gradient(37, 23);
-        let bytes = image.to_png();
-        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes))
-            .read_info()
-            .expect("a header");
-        let mut pixels = vec![0; reader.output_buffer_size().expect("a small image")];
-        let info = reader.next_frame(&mut pixels).expect("pixels");
-        assert_eq!(
-            (info.width, info.height, info.color_type),
-            (37, 23, png::ColorType::Rgb)
-        );
-        assert_eq!(&pixels[..info.buffer_size()], image.rgb);
-    }
-
-    #[test]
     fn sheets_fit_every_cell_with_its_caption() {
-        let images: Vec<_> = (0..5).map(|i| (gradient(40 + i, 30), "|".to_owned())).collect();
+        let images: Vec<_> = (0..5)
+            .map(|i| {
+                let mut image = Image::blank(40 + i, 30);
+                for (place, byte) in image.rgb.iter_mut().enumerate() {
+                    *byte = (place % 251) as u8;
+                }
+                (image, "|".to_owned())
+            })
+            .collect();
         let sheet = contact_sheet(&images, 3).expect("there are images");
         assert_eq!(sheet.width, 3 * (44 + GAP) + GAP);
         assert_eq!(sheet.height, 2 * (30 + CAPTION_HEIGHT + GAP) + GAP);
@@ -203,24 +167,22 @@ mod tests {
             assert_eq!(pixel(&sheet, left + x, top + y), pixel(&images[4].0, x, y));
         }
         let below = (0..44).flat_map(|x| (30..30 + CAPTION_HEIGHT).map(move |y| (x, y)));
-        let ink = below
-            .filter(|(x, y)| pixel(&sheet, left + x, top + y) == [INK; 3])
-            .count();
-        assert_eq!(ink, GLYPH_HEIGHT * CAPTION_SCALE * CAPTION_SCALE);
-        assert!(contact_sheet(&[], 3).is_none());
-        assert_eq!(contact_sheet(&images[..1], 9).expect("one").width, 40 + 2 * GAP);
+        let ink = below.filter(|(x, y)| pixel(&sheet, left + x, top + y) == [INK; 3]);
+        assert_eq!(ink.count(), GLYPH_HEIGHT * CAPTION_SCALE * CAPTION_SCALE);
+        // As another program reads it.
+        let mut reader = png::Decoder::new(std::io::Cursor::new(sheet.to_png()))
+            .read_info()
+            .unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((reader.info().width as usize, pixels), (sheet.width, sheet.rgb));
     }
 
     #[test]
     fn letter_l_is_a_stroke_and_a_foot() {
-        let mut dots = Vec::new();
-        for_each_dot(" L", |x, y| dots.push((x, y)));
         let stroke = (0..GLYPH_HEIGHT - 2).map(|y| (ADVANCE, y));
         let foot = (1..GLYPH_WIDTH).map(|x| (ADVANCE + x, GLYPH_HEIGHT - 3));
-        assert_eq!(dots, stroke.chain(foot).collect::<Vec<_>>());
-        assert_eq!((text_width(" L"), text_width("")), (11, 0));
-        assert_eq!(glyph('\u{e9}'), glyph('?'));
-        let glyphs: std::collections::HashSet<_> = (' '..='~').map(glyph).collect();
-        assert_eq!(glyphs.len(), 95, "every printable character has its own");
+        assert!(dots(" L").eq(stroke.chain(foot)));
+        assert_eq!((text_width(" L"), glyph('\u{e9}')), (11, glyph('?')));
     }
 }

@@ -55,27 +55,14 @@ pub(crate) struct ArmJoints {
     pub(crate) elbow: Vec3,
 }
 
-/// Linear RGB of the parts of a hand.
-struct Complexion {
-    back: Vec3,
-    /// The palm and the pads.
-    palm: Vec3,
-    /// Knuckles and fingertips.
-    flush: Vec3,
-}
-
 impl Person {
-    fn complexion(self) -> Complexion {
-        let [back, palm, flush] = match self {
+    /// Linear RGB of the back of the hand, of the palm and the pads, and of knuckles and fingertips.
+    fn complexion(self) -> [Vec3; 3] {
+        let colours = match self {
             Self::Giver => [[224, 178, 152], [230, 180, 158], [214, 146, 124]],
             Self::Receiver => [[138, 92, 68], [186, 136, 108], [122, 74, 54]],
         };
-        let linear = |[red, green, blue]: [u8; 3]| linear_from_srgb(red, green, blue);
-        Complexion {
-            back: linear(back),
-            palm: linear(palm),
-            flush: linear(flush),
-        }
+        colours.map(|[red, green, blue]| linear_from_srgb(red, green, blue))
     }
 
     fn sleeve_colour(self) -> Vec3 {
@@ -89,14 +76,14 @@ impl Person {
     pub(crate) fn hand(self, name: &str, skin: &Skin, posed: Vec<Vec3>) -> Part {
         let complexion = self.complexion();
         let of_bind = smooth_skin(String::new(), skin.positions.clone(), skin);
-        let mut colours = vec![complexion.back; posed.len()];
+        let mut colours = vec![complexion[0]; posed.len()];
         for (triangle, normals) in skin.triangles.iter().zip(of_bind.corner_normals()) {
             for (&vertex, normal) in triangle.iter().zip(normals) {
                 colours[vertex as usize] = colour_at(skin, vertex as usize, normal, &complexion);
             }
         }
         Part {
-            colour: complexion.back,
+            colour: complexion[0],
             vertex_colours: colours,
             ..smooth_skin(name.to_owned(), posed, skin)
         }
@@ -156,7 +143,7 @@ impl Person {
         let mut part = lathe(name, Vec3::ZERO, Vec3::Z, &profile, self.sleeve_colour());
         for position in &mut part.positions {
             let to_wrist = 1.0 - (position.z / length).clamp(0.0, 1.0);
-            let stretch = Vec2::ONE.lerp(section.outer() / mean, to_wrist);
+            let stretch = Vec2::ONE.lerp(section.outer / mean, to_wrist);
             let across = position.truncate() * stretch + section.centre * to_wrist;
             *position = frame.transform_point(across.extend(position.z));
         }
@@ -212,7 +199,7 @@ fn smooth_skin(name: String, positions: Vec<Vec3>, skin: &Skin) -> Part {
 }
 
 /// The skin's colour at a vertex of the bind pose.
-fn colour_at(skin: &Skin, vertex: usize, normal: Vec3, complexion: &Complexion) -> Vec3 {
+fn colour_at(skin: &Skin, vertex: usize, normal: Vec3, [back, palm, flush]: &[Vec3; 3]) -> Vec3 {
     let mut palmar = 0.0;
     for (&joint, &weight) in skin.joint_indices[vertex].iter().zip(&skin.weights[vertex]) {
         let pose = skin.bind.joints[usize::from(joint)].pose;
@@ -235,22 +222,20 @@ fn colour_at(skin: &Skin, vertex: usize, normal: Vec3, complexion: &Complexion) 
             flushed = flushed.max(near * share);
         }
     }
-    let of_side = complexion
-        .back
-        .lerp(complexion.palm, smoothstep(-0.15, 0.55, palmar));
-    of_side.lerp(complexion.flush, flushed)
+    back.lerp(*palm, smoothstep(-0.15, 0.55, palmar))
+        .lerp(*flush, flushed)
 }
 
 /// The wrist's cross-section in the wrist joint's x and y, in metres.
 struct WristSection {
     centre: Vec2,
-    half_widths: Vec2,
+    /// Half widths of a sleeve around it.
+    outer: Vec2,
 }
 
 impl WristSection {
     fn of(joints: &HandJoints, posed: &[Vec3]) -> Self {
-        let wrist = joints.joints[index::WRIST];
-        let joint_from_world = wrist.pose.inverse();
+        let joint_from_world = joints.joints[index::WRIST].pose.inverse();
         let mut low = Vec2::INFINITY;
         let mut high = Vec2::NEG_INFINITY;
         for &position in posed {
@@ -260,24 +245,13 @@ impl WristSection {
                 high = high.max(local.truncate());
             }
         }
-        let half_widths = (high - low) * 0.5;
-        if half_widths.is_finite() && half_widths.min_element() > 0.005 {
-            let centre = (high + low) * 0.5;
-            Self { centre, half_widths }
-        } else {
-            Self {
-                centre: Vec2::ZERO,
-                half_widths: Vec2::splat(wrist.radius.max(0.015)),
-            }
+        Self {
+            centre: (high + low) * 0.5,
+            outer: (high - low) * 0.5 + CLEARANCE,
         }
     }
 
-    /// Half widths of a sleeve around it.
-    fn outer(&self) -> Vec2 {
-        self.half_widths + CLEARANCE
-    }
-
     fn sleeve_radius(&self) -> f32 {
-        0.5 * self.outer().element_sum()
+        0.5 * self.outer.element_sum()
     }
 }

@@ -51,7 +51,6 @@ const OPENNESS: f32 = 0.75;
 /// Postures closer than this are the same, in metres.
 const SAME: f32 = 1e-4;
 
-/// A hand in some frame.
 #[derive(Clone, Copy, Debug)]
 struct Posture {
     /// The wrist's `OpenXR` joint frame.
@@ -62,7 +61,6 @@ struct Posture {
 /// The way to a grasp, in the object's frame: drawn back, open at the object, closed.
 type WayIn = [Posture; 3];
 
-/// A receiving hand that moves.
 #[derive(Debug)]
 pub(crate) struct Receiver {
     pub(crate) skin: &'static Skin,
@@ -145,19 +143,18 @@ impl Receiver {
             let next = next.map_or(self.waiting, |next| next.moved(client_from_object));
             let distance = self.posture.distance(&next);
             let is_last = self.way.len() <= usize::from(self.hold.is_some());
-            if !is_last && distance < CORNER {
-                self.way.pop_front();
-                continue;
+            if is_last || distance >= CORNER {
+                let slow = (SLOWING * distance).max(LAST_SPEED);
+                let speed = if is_last { TOP_SPEED.min(slow) } else { TOP_SPEED };
+                let share = speed * seconds / distance;
+                self.posture = if share < 1.0 {
+                    self.posture.blended(&next, share)
+                } else {
+                    next
+                };
+                return;
             }
-            let slow = (SLOWING * distance).max(LAST_SPEED);
-            let speed = if is_last { TOP_SPEED.min(slow) } else { TOP_SPEED };
-            let step = speed * seconds;
-            self.posture = if distance <= step {
-                next
-            } else {
-                self.posture.blended(&next, step / distance)
-            };
-            return;
+            self.way.pop_front();
         }
     }
 
@@ -166,7 +163,6 @@ impl Receiver {
         self.hold.is_none() && self.posture.distance(&self.waiting) < SAME
     }
 
-    /// The joints, in the client's frame.
     pub(crate) fn joints(&self) -> HandJoints {
         posed(&self.rig, self.posture.wrist, self.posture.digits)
     }
@@ -236,7 +232,7 @@ impl Posture {
         let way = self.wrist.position.distance(other.wrist.position);
         let turn = angle_between(self.wrist.orientation, other.wrist.orientation);
         let bends = self.digits.iter().zip(&other.digits).flat_map(|(a, b)| {
-            let (a, b) = (angles(a), angles(b));
+            let (a, b) = (a.to_array(), b.to_array());
             [0, 1, 2, 3].map(|i| (a[i] - b[i]).abs())
         });
         let bend = bends.fold(0.0, f32::max);
@@ -245,36 +241,14 @@ impl Posture {
 
     /// The posture a share of the way to another one.
     fn blended(&self, other: &Self, share: f32) -> Self {
-        let mut digits = self.digits;
-        for (digit, other) in digits.iter_mut().zip(&other.digits) {
-            *digit = mixed(digit, other, share);
-        }
+        let (from, to) = (self.wrist, other.wrist);
         Self {
             wrist: Pose {
-                position: self.wrist.position.lerp(other.wrist.position, share),
-                orientation: self.wrist.orientation.slerp(other.wrist.orientation, share),
+                position: from.position.lerp(to.position, share),
+                orientation: from.orientation.slerp(to.orientation, share),
             },
-            digits,
+            digits: std::array::from_fn(|i| self.digits[i].toward(&other.digits[i], share)),
         }
-    }
-}
-
-fn angles(digit: &DigitAngles) -> [f32; 4] {
-    [
-        digit.base_yaw,
-        digit.base_pitch,
-        digit.second_pitch,
-        digit.third_pitch,
-    ]
-}
-
-fn mixed(from: &DigitAngles, to: &DigitAngles, share: f32) -> DigitAngles {
-    let mix = |from: f32, to: f32| from + share * (to - from);
-    DigitAngles {
-        base_yaw: mix(from.base_yaw, to.base_yaw),
-        base_pitch: mix(from.base_pitch, to.base_pitch),
-        second_pitch: mix(from.second_pitch, to.second_pitch),
-        third_pitch: mix(from.third_pitch, to.third_pitch),
     }
 }
 
@@ -286,15 +260,12 @@ fn angle_between(a: Quat, b: Quat) -> f32 {
 
 /// Fingers on the way to stretched ones; the thumb turns no farther out of the palm than it is.
 fn opened(closed: [DigitAngles; 5], rig: &Rig) -> [DigitAngles; 5] {
-    let mut digits = closed;
-    for (digit, stretched) in digits.iter_mut().zip(&rig.stretched()) {
-        let stretched = DigitAngles {
-            base_yaw: digit.base_yaw,
-            ..*stretched
-        };
-        *digit = mixed(digit, &stretched, OPENNESS);
+    let mut stretched = rig.stretched();
+    for (stretched, closed) in stretched.iter_mut().zip(&closed) {
+        stretched.base_yaw = closed.base_yaw;
+        *stretched = closed.toward(stretched, OPENNESS);
     }
-    digits
+    stretched
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 use std::time::Duration;
 
 use glam::{Vec2, Vec3};
+use grasp_synthesis::base::pose::Pose;
 use obvhs::{
     BvhBuildParams,
     bvh2::{Bvh2, builder::build_bvh2_from_tris},
@@ -55,7 +56,6 @@ pub struct ViewSize {
 }
 
 impl ViewSize {
-    /// Width divided by height.
     pub(crate) fn aspect(self) -> f32 {
         self.width as f32 / self.height as f32
     }
@@ -70,24 +70,31 @@ pub(crate) fn render(
     up: Vec3,
 ) -> Image {
     let (width, height) = (width as usize, height as usize);
-    let studio = Studio { stage, camera, up };
     let samples = samples();
     let size = Vec2::new(width as f32, height as f32);
     let mut pixels = vec![0; width * height * 3];
     pixels.par_chunks_mut(width * 3).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.chunks_exact_mut(3).enumerate() {
             let corner = Vec2::new(x as f32, y as f32);
-            let light = samples
-                .iter()
-                .map(|sample| studio.light_at((corner + sample.within) / size, sample));
+            let light = samples.iter().map(|sample| {
+                let at = (corner + sample.within) / size;
+                let ray = camera.ray(at);
+                let seen = stage.seen(camera.world_from_camera.position, ray);
+                let solid = seen.solid.as_ref();
+                let solid = solid.map(|hit| stage.shaded(hit, ray, sample, camera.world_from_camera, up));
+                seen.with_marker(ray, solid.unwrap_or_else(|| backdrop(at)))
+            });
             let mean = light.sum::<Vec3>() / samples.len() as f32;
             pixel.copy_from_slice(&srgb_from_linear(mean));
         }
     });
-    Image::from_rgb(width, height, pixels)
+    Image {
+        width,
+        height,
+        rgb: pixels,
+    }
 }
 
-/// A sample of a pixel.
 struct Sample {
     /// Its place, from 0 to 1 along each side.
     within: Vec2,
@@ -112,61 +119,6 @@ fn samples() -> Vec<Sample> {
         }
     };
     (0..count).map(sample).collect()
-}
-
-/// What a pixel's colour depends on.
-struct Studio<'a> {
-    stage: &'a Stage,
-    camera: &'a Camera,
-    up: Vec3,
-}
-
-impl Studio<'_> {
-    /// The linear light from a place of the picture.
-    fn light_at(&self, at: Vec2, sample: &Sample) -> Vec3 {
-        let ray = self.camera.ray(at);
-        let seen = self.stage.seen(self.camera.world_from_camera.position, ray);
-        let solid = seen.solid.as_ref();
-        let light = solid.map_or_else(|| backdrop(at), |hit| self.shaded(hit, ray, sample));
-        let Some(marker) = &seen.marker else {
-            return light;
-        };
-        // Nearly flat, with just enough shading to show the shape.
-        let marked = marker.colour * (0.72 - 0.28 * marker.normal.dot(ray).min(0.0));
-        let glow = if seen.is_marker_hidden() { MARKER_GLOW } else { 1.0 };
-        light.lerp(marked, glow)
-    }
-
-    /// The light from a point that a ray meets.
-    fn shaded(&self, hit: &Hit, ray: Vec3, sample: &Sample) -> Vec3 {
-        let offset = (sample.within - 0.5) * LIGHT_WIDTH;
-        let to_light = LIGHT_DIRECTION + offset.extend(0.0);
-        let to_light = self
-            .camera
-            .world_from_camera
-            .transform_vector(to_light)
-            .normalize_or(self.up);
-        let start = hit.start + hit.normal * LIFT;
-        // Light scatters in skin.
-        let (wrap, shine, gloss) = match hit.finish {
-            Finish::Satin => (0.0, 0.22, 48.0),
-            Finish::Metal => (0.0, 0.8, 40.0),
-            Finish::Skin => (0.25, 0.06, 16.0),
-            Finish::Cloth | Finish::Marker => (0.0, 0.0, 1.0),
-        };
-        let mut direct = ((hit.normal.dot(to_light) + wrap) / (1.0 + wrap)).max(0.0);
-        if direct > 0.0 && self.stage.solids.is_blocked(start, to_light, f32::INFINITY) {
-            direct = 0.0;
-        }
-        let around = (hit.normal + sample.around * 0.999).normalize_or(hit.normal);
-        let is_open = !self.stage.solids.is_blocked(start, around, SURROUNDINGS);
-        let sky = FLOOR.lerp(CEILING, 0.5 + 0.5 * hit.normal.dot(self.up));
-        let ambient = if is_open { sky } else { sky * 0.25 };
-        // Blinn and Phong.
-        let half = (to_light - ray).normalize_or(hit.normal);
-        let highlight = shine * direct * hit.normal.dot(half).max(0.0).powf(gloss);
-        hit.colour * (LIGHT * direct + ambient) + LIGHT * highlight
-    }
 }
 
 /// A wall that is darker toward the picture's corners and floor.
@@ -201,9 +153,47 @@ impl Stage {
             marker: self.markers.first_hit(eye, ray),
         }
     }
+
+    /// The light from a point that a ray meets.
+    fn shaded(&self, hit: &Hit, ray: Vec3, sample: &Sample, camera: Pose, up: Vec3) -> Vec3 {
+        let offset = (sample.within - 0.5) * LIGHT_WIDTH;
+        let to_light = LIGHT_DIRECTION + offset.extend(0.0);
+        let to_light = camera.transform_vector(to_light).normalize_or(up);
+        let start = hit.start + hit.normal * LIFT;
+        // Light scatters in skin.
+        let (wrap, shine, gloss) = match hit.finish {
+            Finish::Satin => (0.0, 0.22, 48.0),
+            Finish::Metal => (0.0, 0.8, 40.0),
+            Finish::Skin => (0.25, 0.06, 16.0),
+            Finish::Cloth | Finish::Marker => (0.0, 0.0, 1.0),
+        };
+        let mut direct = ((hit.normal.dot(to_light) + wrap) / (1.0 + wrap)).max(0.0);
+        if direct > 0.0 && self.solids.is_blocked(start, to_light, f32::INFINITY) {
+            direct = 0.0;
+        }
+        let around = (hit.normal + sample.around * 0.999).normalize_or(hit.normal);
+        let is_open = !self.solids.is_blocked(start, around, SURROUNDINGS);
+        let sky = FLOOR.lerp(CEILING, 0.5 + 0.5 * hit.normal.dot(up));
+        let ambient = if is_open { sky } else { sky * 0.25 };
+        // Blinn and Phong.
+        let half = (to_light - ray).normalize_or(hit.normal);
+        let highlight = shine * direct * hit.normal.dot(half).max(0.0).powf(gloss);
+        hit.colour * (LIGHT * direct + ambient) + LIGHT * highlight
+    }
 }
 
 impl Seen {
+    /// The light of a place, with the marker that is before or behind it.
+    fn with_marker(&self, ray: Vec3, light: Vec3) -> Vec3 {
+        let Some(marker) = &self.marker else {
+            return light;
+        };
+        // Nearly flat, with just enough shading to show the shape.
+        let marked = marker.colour * (0.72 - 0.28 * marker.normal.dot(ray).min(0.0));
+        let glow = if self.is_marker_hidden() { MARKER_GLOW } else { 1.0 };
+        light.lerp(marked, glow)
+    }
+
     pub(crate) fn is_marker_hidden(&self) -> bool {
         let [solid, marker] = [self.solid, self.marker].map(|hit| hit.map(|hit| hit.distance));
         solid.is_some_and(|solid| marker.is_some_and(|marker| solid < marker))
@@ -219,12 +209,9 @@ struct Tracer {
     boxes: Option<Bvh2>,
 }
 
-/// How a triangle looks.
 #[derive(Clone, Copy)]
 struct Look {
-    /// Smooth unit normals at its corners.
     normals: [Vec3; 3],
-    /// Linear RGB at its corners.
     colours: [Vec3; 3],
     finish: Finish,
     /// Index of its part.
@@ -359,7 +346,6 @@ mod tests {
         render(&Stage::new(&parts), camera, SIZE, Vec3::Y)
     }
 
-    /// The middle pixel.
     fn middle(image: &Image) -> [i32; 3] {
         pixel(image, 60, 45)
     }
@@ -383,19 +369,16 @@ mod tests {
     }
 
     #[test]
-    fn nearer_parts_hide_farther_ones() {
+    fn nearer_parts_hide_farther_ones_but_markers_are_faintly_visible() {
         let front = sphere("front", Vec3::Z * 0.1, 0.05, RED);
         let back = sphere("back", Vec3::Z * -0.1, 0.05, BLUE);
-        for parts in [[front.clone(), back.clone()], [back, front]] {
-            let [r, _, b] = middle(&drawn(parts.clone(), &looking_from(Vec3::Z * 0.7)));
-            assert!(r > 2 * b, "red {r} is in front of blue {b}");
-            let [r, _, b] = middle(&drawn(parts, &looking_from(Vec3::Z * -0.7)));
-            assert!(b > 2 * r, "blue {b} is in front of red {r}");
-        }
-    }
-
-    #[test]
-    fn hidden_markers_are_faintly_visible() {
+        let [r, _, b] = middle(&drawn(
+            [back.clone(), front.clone()],
+            &looking_from(Vec3::Z * 0.7),
+        ));
+        assert!(r > 2 * b, "red {r} is in front of blue {b}");
+        let [r, _, b] = middle(&drawn([back, front], &looking_from(Vec3::Z * -0.7)));
+        assert!(b > 2 * r, "blue {b} is in front of red {r}");
         let camera = looking_from(Vec3::Z * 0.5);
         let ball = sphere("ball", Vec3::ZERO, 0.05, BLUE);
         let mark = |z: f32| sphere("mark", Vec3::Z * z, 0.01, RED).with_finish(Finish::Marker);
@@ -413,12 +396,8 @@ mod tests {
     fn parts_cast_shadows() {
         // A ball above a slab, seen from above; the light comes from the picture's upper left.
         let corners = [(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)].map(|(x, z)| Vec3::new(x, 0.0, z));
-        let slab = Part::new(
-            "slab",
-            corners.to_vec(),
-            vec![[0, 2, 1], [0, 3, 2]],
-            Vec3::splat(0.4),
-        );
+        let triangles = vec![[0, 2, 1], [0, 3, 2]];
+        let slab = Part::new("slab", corners.to_vec(), triangles, Vec3::splat(0.4));
         let ball = sphere("ball", Vec3::Y * 0.03, 0.03, RED);
         let camera = looking_from(Vec3::Y * 0.6);
         let (alone, with_ball) = (drawn([slab.clone()], &camera), drawn([slab, ball], &camera));
@@ -428,12 +407,9 @@ mod tests {
             pixel(image, (60.0 + scale * x) as usize, (45.0 + scale * z) as usize)[1]
         };
         // Right of and below the ball, away from the light; then far from it, toward the light.
-        let (before, after) = (
-            brightness(&alone, 0.035, 0.045),
-            brightness(&with_ball, 0.035, 0.045),
-        );
-        assert!(after + 40 < before, "{after} is not darker than {before}");
-        let change = brightness(&alone, -0.08, -0.09) - brightness(&with_ball, -0.08, -0.09);
+        let change = |x, z| brightness(&with_ball, x, z) - brightness(&alone, x, z);
+        assert!(change(0.035, 0.045) < -40);
+        let change = change(-0.08, -0.09);
         assert!(change.abs() <= 3, "open ground changed by {change}");
     }
 }

@@ -1,6 +1,6 @@
 //! A track of a moving giver as it was played, as an animation.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, btree_map::Entry};
 
 use grasp_client::v1::{self, Convention, CurrentGraspStatus};
 use grasp_synthesis::{base::pose::Pose, model::hand::joints::HandJoints};
@@ -22,15 +22,8 @@ const FRAME_SECONDS: f32 = 1.0 / 90.0;
 pub struct TrackRecording {
     convention: Convention,
     frames: Vec<v1::TrackFrame>,
-    answers: Vec<Known>,
-}
-
-/// An answer that was known when a frame was to be shown.
-#[derive(Clone, Debug)]
-struct Known {
-    /// The first such frame, by its place among those sent.
-    since: usize,
-    answer: v1::TrackAnswer,
+    /// Answers, with the first frame for which each was known.
+    answers: Vec<(usize, v1::TrackAnswer)>,
 }
 
 impl TrackRecording {
@@ -51,10 +44,7 @@ impl TrackRecording {
 
     /// Adds an answer that has come. It is known from the next frame on.
     pub fn answered(&mut self, answer: &v1::TrackAnswer) {
-        self.answers.push(Known {
-            since: self.frames.len(),
-            answer: answer.clone(),
-        });
+        self.answers.push((self.frames.len(), answer.clone()));
     }
 
     /// The motion as a binary glTF file with an animation, a moment per frame: giver and object as they were sent, and a receiver
@@ -78,18 +68,14 @@ impl TrackRecording {
         }))
     }
 
-    /// Seconds since the first frame.
     fn times(&self) -> Vec<f32> {
         let captured: Option<Vec<_>> = self.frames.iter().map(v1::TrackFrame::capture_time).collect();
-        let mut times: Vec<f32> = match captured {
-            Some(captured) => {
-                let first = captured.first().copied().unwrap_or_default();
-                let since = captured.iter().map(|time| time.saturating_sub(first));
-                since.map(|time| time.as_secs_f32()).collect()
-            }
-            None => (0..self.frames.len())
-                .map(|frame| frame as f32 * FRAME_SECONDS)
-                .collect(),
+        let mut times: Vec<f32> = if let Some(captured) = captured {
+            let since = captured.iter().map(|time| time.saturating_sub(captured[0]));
+            since.map(|time| time.as_secs_f32()).collect()
+        } else {
+            let frames = 0..self.frames.len();
+            frames.map(|frame| frame as f32 * FRAME_SECONDS).collect()
         };
         // Times of an animation rise, but frames may be of the same time.
         for i in 1..times.len() {
@@ -141,12 +127,13 @@ impl TrackRecording {
             return Ok(Vec::new());
         };
         let mut receivers: BTreeMap<(bool, String), Receiver> = BTreeMap::new();
-        for known in &self.answers {
-            if let Some(grasp) = &known.answer.grasp
-                && !receivers.contains_key(&key(grasp))
-            {
-                let hand = Receiver::waiting_for(grasp, first_pose)?;
-                receivers.insert(key(grasp), hand);
+        let grasps = self
+            .answers
+            .iter()
+            .filter_map(|(_, answer)| answer.grasp.as_ref());
+        for grasp in grasps {
+            if let Entry::Vacant(unknown) = receivers.entry(key(grasp)) {
+                unknown.insert(Receiver::waiting_for(grasp, first_pose)?);
             }
         }
         let is_alone = receivers.len() == 1;
@@ -154,8 +141,8 @@ impl TrackRecording {
         let mut answers = self.answers.iter().peekable();
         let mut before = 0.0;
         for (frame, (&time, &pose)) in times.iter().zip(&poses).enumerate() {
-            while let Some(known) = answers.next_if(|known| known.since <= frame) {
-                apply(&known.answer, &mut receivers);
+            while let Some((_, answer)) = answers.next_if(|(since, _)| *since <= frame) {
+                apply(answer, &mut receivers);
             }
             for (receiver, moved) in receivers.values_mut().zip(&mut moved) {
                 receiver.advance(time - before, pose);
@@ -179,7 +166,7 @@ impl TrackRecording {
 }
 
 /// A role's name, with a number if others have the same role.
-fn numbered(role: &str, others: usize) -> String {
+pub(crate) fn numbered(role: &str, others: usize) -> String {
     match others {
         0 => role.to_owned(),
         _ => format!("{role}_{}", others + 1),
@@ -235,23 +222,20 @@ mod tests {
 
     use super::*;
 
-    /// A track of 101 frames, 10 per second.
-    fn recording() -> TrackRecording {
-        let mut recording = TrackRecording::new(&v1::Track::new("objects/remote"));
-        for sequence in 0..101 {
-            let time = Duration::from_millis(700 + 100 * sequence);
-            recording.sent(&v1::TrackFrame::of(sequence, v1::Holdout::default()).captured_at(time));
-        }
-        recording
-    }
-
     #[test]
-    fn times_rise_even_if_frames_are_of_the_same_time() {
-        let mut recording = recording();
-        recording.frames[5].capture_time = recording.frames[4].capture_time;
+    fn times_rise_even_if_frames_are_of_the_same_time_and_other_conventions_are_refused() {
+        let track = v1::Track::new("objects/remote").with_convention(Convention::Unreal);
+        let mut recording = TrackRecording::new(&track);
+        for milliseconds in [700, 800, 800, 950] {
+            let frame = v1::TrackFrame::of(0, v1::Holdout::default());
+            recording.sent(&frame.captured_at(Duration::from_millis(milliseconds)));
+        }
         let times = recording.times();
         assert!(times.is_sorted_by(|a, b| a < b));
-        assert_eq!((times[0], times[100]), (0.0, 10.0));
+        assert_eq!((times[0], times[3]), (0.0, 0.25));
+        let object = Part::built_in_object("remote").unwrap();
+        let refused = recording.to_glb(object).unwrap_err();
+        assert!(refused.to_string().contains("openxr"), "{refused}");
     }
 
     #[test]
@@ -297,14 +281,5 @@ mod tests {
         }
         let grasped = (object(89) * wrist).position();
         assert!(at(receiver, 10).distance(grasped) > 0.1 && at(receiver, 89).distance(grasped) < 1e-3);
-    }
-
-    #[test]
-    fn other_conventions_are_refused() {
-        let mut recording = recording();
-        recording.convention = Convention::Unreal;
-        let object = Part::built_in_object("remote").unwrap();
-        let refused = recording.to_glb(object).unwrap_err();
-        assert!(refused.to_string().contains("openxr"), "{refused}");
     }
 }

@@ -2,27 +2,24 @@
 
 mod scripted;
 
-use std::{
-    path::PathBuf,
-    process::{Command, Output},
-    time::Duration,
-};
+use std::{process::Command, time::Duration};
 
 use glam::{Quat, Vec3};
 use grasp_client::{
-    ClientError, GraspClient, Handedness, Outcome, RetryPolicy, std_duration,
+    ClientError, Code, ErrorDetails, GraspClient, Handedness, Outcome, RetryPolicy, std_duration,
     v1::{
-        self, Contact, CurrentGrasp, DigitAngles, FindGraspRequest, Grasp, HandPose, Holdout, JointPose,
-        NodePose, Pose, Shape, Track, TrackFrame,
+        Contact, CreateObjectRequest, CurrentGrasp, DigitAngles, FindGraspRequest, FindGraspResponse,
+        GetMeshResponse, Grasp, GraspObject, HandPose, Holdout, JointPose, ListObjectsRequest,
+        ListObjectsResponse, NodePose, Pose, Shape, Track, TrackFrame, UploadObjectRequest,
+        upload_object_request::Part,
     },
     wire_duration,
 };
-use tonic::{Code, Status};
-use tonic_types::{ErrorDetails, StatusExt as _};
+use tonic::Status;
+use tonic_types::StatusExt as _;
 
-use crate::scripted::{Act, Scripted};
+use crate::scripted::{Act, Call, Scripted};
 
-/// Retries with negligible waits.
 fn quick() -> RetryPolicy {
     RetryPolicy {
         initial_backoff: Duration::from_millis(1),
@@ -31,7 +28,6 @@ fn quick() -> RetryPolicy {
     }
 }
 
-/// Starts the service and connects to it.
 async fn connect(service: &Scripted, call_timeout: Duration) -> GraspClient {
     GraspClient::builder(service.serve().await)
         .call_timeout(call_timeout)
@@ -43,56 +39,57 @@ async fn connect(service: &Scripted, call_timeout: Duration) -> GraspClient {
 
 const PATIENT: Duration = Duration::from_mins(1);
 
-fn unavailable() -> Act {
-    Act::Fail(Status::unavailable("draining"))
+fn object(name: &str) -> GraspObject {
+    GraspObject {
+        name: name.to_owned(),
+        ..GraspObject::default()
+    }
 }
 
 #[tokio::test]
 async fn retries_unavailable_until_answered() {
-    let service = Scripted::new([unavailable(), unavailable(), Act::Answer]);
+    let answer = FindGraspResponse {
+        outcome: Outcome::BudgetExhausted.into(),
+        ..FindGraspResponse::default()
+    };
+    let service = Scripted::new([Act::unavailable(), Act::unavailable(), Act::answer(&[answer])]);
     let client = connect(&service, PATIENT).await;
-    let answer = client
-        .find_grasp(&v1::FindGraspRequest::new("objects/remote"))
-        .await
-        .unwrap();
-    assert_eq!(answer.outcome(), Outcome::BudgetExhausted);
-    assert_eq!(answer.attempts(), 5);
-    assert_eq!(service.calls(), 3);
+    let answer = client.find_grasp(&FindGraspRequest::new("objects/remote")).await;
+    assert_eq!(answer.unwrap().outcome(), Outcome::BudgetExhausted);
+    assert_eq!(service.calls().len(), 3);
 }
 
 #[tokio::test]
 async fn retries_of_a_creation_have_the_same_id_and_other_calls_another() {
-    let service = Scripted::new([Act::Answer, Act::Answer]);
+    let created = || Act::answer(&[object("objects/mug")]);
+    let service = Scripted::new([created(), Act::unavailable(), created()]);
     let client = connect(&service, PATIENT).await;
-    let object = v1::CreateObjectRequest::new("mug", "v 0 0 0", 0.3);
     for _ in 0..2 {
-        client.create_object(&object).await.unwrap();
+        let mug = CreateObjectRequest::new("mug", "v 0 0 0", 0.3);
+        client.create_object(&mug).await.unwrap();
     }
-    let ids = service.request_ids.lock().unwrap().clone();
-    assert!(
-        ids.len() == 2 && ids[0] != ids[1] && ids[0].len() == 36,
-        "{ids:?}"
-    );
-    // The id is recorded before the script decides.
-    let service = Scripted::new([unavailable(), Act::Answer]);
-    let client = connect(&service, PATIENT).await;
-    client.create_object(&object).await.unwrap();
-    let ids = service.request_ids.lock().unwrap().clone();
-    assert!(ids.len() == 2 && ids[0] == ids[1], "{ids:?}");
+    let calls = service.calls();
+    let [first, second, retry] = &calls[..] else {
+        panic!("{} calls", calls.len())
+    };
+    let id = |call: &Call| call.messages::<CreateObjectRequest>()[0].request_id.clone();
+    assert!(id(first) != id(second) && id(first).len() == 36);
+    assert_eq!(id(second), id(retry));
 }
 
 #[tokio::test]
 async fn does_not_wait_beyond_the_deadline() {
     let details = ErrorDetails::with_retry_info(Some(Duration::from_hours(1)));
     let status = Status::with_error_details(Code::Unavailable, "come back in an hour", details);
-    let service = Scripted::new([Act::Fail(status), Act::Answer]);
+    let service = Scripted::new([Act::Fail(status)]);
     let client = connect(&service, PATIENT).await;
     let error = client.get_object("objects/remote").await.unwrap_err();
-    let ClientError::Unavailable(call) = error else {
-        panic!("{error:?}")
-    };
-    assert_eq!(call.details.retry_delay, Some(Duration::from_hours(1)));
-    assert_eq!(service.calls(), 1);
+    let call = error.call().unwrap();
+    let delay = call.details.retry_info().and_then(|info| info.retry_delay);
+    assert_eq!(
+        (call.code, delay),
+        (Code::Unavailable, Some(Duration::from_hours(1)))
+    );
 }
 
 #[tokio::test]
@@ -100,38 +97,51 @@ async fn reports_deadline_exceeded_without_answer() {
     let service = Scripted::new([Act::Hang]);
     let client = connect(&service, Duration::from_millis(50)).await;
     let error = client.get_object("objects/remote").await.unwrap_err();
-    assert!(matches!(error, ClientError::DeadlineExceeded(_)), "{error:?}");
+    assert_eq!(error.code(), Some(Code::DeadlineExceeded), "{error}");
 }
 
 #[tokio::test]
 async fn sends_deadline_plus_budget() {
-    let service = Scripted::new([Act::Answer, Act::Answer]);
+    let found = FindGraspResponse::default();
+    let service = Scripted::new([Act::answer(&[object("objects/remote")]), Act::answer(&[found])]);
     let client = connect(&service, PATIENT).await;
     client.get_object("objects/remote").await.unwrap();
-    let request = v1::FindGraspRequest::new("objects/remote").with_budget(Duration::from_secs(40));
+    let request = FindGraspRequest::new("objects/remote").with_budget(Duration::from_secs(40));
     client.find_grasp(&request).await.unwrap();
-    let sent = service.grpc_timeouts.lock().unwrap().clone();
     // The header has the microseconds left, in eight digits, and sending it takes less than a second.
-    for (sent, most) in sent.iter().zip([60.0, 100.0]) {
-        let (digits, unit) = sent.split_at(sent.len() - 1);
+    for (Call { timeout, .. }, most) in service.calls().iter().zip([60.0, 100.0]) {
+        let (digits, unit) = timeout.split_at(timeout.len() - 1);
         let per_second = if unit == "u" { 1e6 } else { 1e3 };
         let seconds = digits.parse::<f64>().unwrap() / per_second;
-        assert!(seconds > most - 1.0 && seconds <= most, "{sent}");
+        assert!(seconds > most - 1.0 && seconds <= most, "{timeout}");
     }
 }
 
 #[tokio::test]
 async fn reads_all_pages_of_a_list_and_rejects_a_repeated_token() {
-    let mut service = Scripted::new((0..5).map(|_| Act::Answer));
-    let request = v1::ListObjectsRequest::default();
+    let page = |name: &str, next: &str| {
+        Act::answer(&[ListObjectsResponse {
+            objects: vec![object(name)],
+            next_page_token: next.to_owned(),
+        }])
+    };
+    let pages = [
+        page("a", "b"),
+        page("b", "c"),
+        page("c", ""),
+        page("a", "b"),
+        page("b", "b"),
+    ];
+    let service = Scripted::new(pages);
     let client = connect(&service, PATIENT).await;
+    let request = ListObjectsRequest::default();
     let objects = client.list_objects(&request).await.unwrap();
     let names: Vec<_> = objects.iter().map(|object| object.name.as_str()).collect();
-    assert_eq!(names, ["objects/", "objects/b", "objects/c"]);
-    service.repeats_page_token = true;
-    let client = connect(&service, PATIENT).await;
+    assert_eq!(names, ["a", "b", "c"]);
+    let third = &service.calls()[2].messages::<ListObjectsRequest>()[0];
+    assert_eq!(third.page_token, "c");
     let error = client.list_objects(&request).await.unwrap_err();
-    assert!(matches!(error, ClientError::Malformed { .. }), "{error:?}");
+    assert!(matches!(error, ClientError::Malformed(_)), "{error:?}");
 }
 
 #[tokio::test]
@@ -155,54 +165,50 @@ async fn distinguishes_invalid_endpoints_from_closed_ports() {
         .connect_lazy()
         .unwrap();
     let error = client.health().await.unwrap_err();
-    assert!(matches!(error, ClientError::Unavailable(_)), "{error:?}");
-    assert_eq!(error.call().unwrap().attempts, 4);
-}
-
-/// The file of a mesh, of a header that says `length` and a body of zeros.
-fn glb(length: u32, body: usize) -> Vec<u8> {
-    let mut glb = b"glTF\x02\x00\x00\x00".to_vec();
-    glb.extend(length.to_le_bytes());
-    glb.extend(vec![0; body]);
-    glb
+    let call = error.call().unwrap();
+    assert_eq!((call.code, call.attempts), (Code::Unavailable, 4));
 }
 
 #[tokio::test]
-async fn reads_a_mesh_and_notices_what_is_missing() {
-    let whole = glb(300_012, 300_000);
-    for (file, expected) in [
-        (whole.clone(), Some(&whole)),
-        (glb(300_012, 299_999), None),
-        (glb(300_012, 300_001), None),
-        (b"glTF".to_vec(), None),
-        (b"v 0 0 0\nv 1 0 0\n".to_vec(), None),
-        (Vec::new(), None),
-    ] {
-        let mut service = Scripted::new([unavailable(), Act::Answer]);
-        service.mesh = file;
-        let client = connect(&service, PATIENT).await;
-        match (client.get_mesh("objects/mug").await, expected) {
-            (Ok(mesh), Some(expected)) => {
-                assert!(mesh.glb == *expected, "{} bytes", mesh.glb.len());
-                assert_eq!(mesh.etag, "1");
-            }
-            (Err(ClientError::Malformed { field, .. }), None) => assert_eq!(field, "piece"),
-            (answer, _) => panic!("{answer:?}"),
-        }
-    }
+async fn meshes_are_read_from_their_pieces() {
+    let part = |piece: &[u8], etag: &str| GetMeshResponse {
+        piece: piece.to_vec(),
+        etag: etag.to_owned(),
+    };
+    let service = Scripted::new([
+        Act::unavailable(),
+        Act::answer(&[part(b"glTF", "1"), part(b"\x02\0", "")]),
+    ]);
+    let mesh = connect(&service, PATIENT)
+        .await
+        .get_mesh("objects/mug")
+        .await
+        .unwrap();
+    assert_eq!(
+        (mesh.glb.as_slice(), mesh.etag.as_str()),
+        (&b"glTF\x02\0"[..], "1")
+    );
 }
 
 #[tokio::test]
 async fn large_meshes_are_sent_in_pieces() {
-    let service = Scripted::new([unavailable(), Act::Answer]);
+    let service = Scripted::new([Act::unavailable(), Act::answer(&[object("objects/mug")])]);
     let client = connect(&service, PATIENT).await;
     let mesh: Vec<u8> = (0..=(8 << 20)).map(|i: u32| i as u8).collect();
-    let request = v1::CreateObjectRequest::new("mug", mesh.clone(), 0.3);
-    let object = client.create_object(&request).await.unwrap();
-    assert_eq!(object.name, "objects/mug");
-    assert!(*service.uploaded.lock().unwrap() == mesh);
-    let ids = service.request_ids.lock().unwrap().clone();
-    assert!(ids.len() == 1 && ids[0].len() == 36, "{ids:?}");
+    let request = CreateObjectRequest::new("mug", mesh.clone(), 0.3);
+    client.create_object(&request).await.unwrap();
+    let [retried, sent] = [0, 1].map(|call| service.calls()[call].messages::<UploadObjectRequest>());
+    assert_eq!(retried, sent);
+    let (first, rest) = sent.split_first().unwrap();
+    assert!(matches!(&first.part, Some(Part::Create(create)) if create.request_id.len() == 36));
+    assert_eq!(first.total_bytes, mesh.len() as u64);
+    let (last, pieces) = rest.split_last().unwrap();
+    assert!(matches!(&last.part, Some(Part::Sha256(hash)) if hash.len() == 64));
+    let pieces = pieces.iter().map(|part| match &part.part {
+        Some(Part::Piece(piece)) => piece.as_slice(),
+        other => panic!("{other:?}"),
+    });
+    assert!(pieces.collect::<Vec<_>>().concat() == mesh);
 }
 
 /// A hand of the rig `adult` whose wrist is here in the client's frame.
@@ -321,29 +327,14 @@ fn contacts_are_moved_to_the_clients_frame() {
 
 /// Runs an example that cargo built along with this test; its standard output.
 async fn run(name: &str, arguments: &[&str]) -> String {
-    let url = real_server().await;
     // The test is in `deps`, next to `examples`.
     let test = std::env::current_exe().unwrap();
-    let folder = test.parent().and_then(|deps| deps.parent()).unwrap();
-    let example: PathBuf = folder
-        .join("examples")
-        .join(name)
-        .with_extension(std::env::consts::EXE_EXTENSION);
-    assert!(
-        example.exists(),
-        "build the examples: cargo build --package grasp-client --examples"
-    );
-    let mut command = Command::new(example);
-    command.arg(&url).args(arguments);
-    let output: Output = tokio::task::spawn_blocking(move || command.output())
-        .await
-        .unwrap()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let folder = test.ancestors().nth(2).unwrap().join("examples");
+    let mut command = Command::new(folder.join(name));
+    command.arg(real_server().await).args(arguments);
+    let output = tokio::task::block_in_place(|| command.output()).expect("cargo has built the examples");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
     String::from_utf8(output.stdout).unwrap()
 }
 
@@ -360,31 +351,24 @@ async fn real_server() -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn find_grasp_prints_wrist_and_joints() {
+async fn examples_find_grasps_and_write_an_animation() {
     let output = run("find_grasp", &[]).await;
     assert!(
         output.contains("wrist: at") && output.contains("joint 25: at"),
         "{output}"
     );
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn register_object_finds_grasp_with_tracked_giver() {
     let output = run("register_object", &[]).await;
     assert!(
         output.starts_with("objects/torch: 92 triangles, 150 g"),
         "{output}"
     );
     assert!(output.contains("Thumb touches triangle"), "{output}");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn track_prints_changes_and_writes_an_animation() {
-    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("example_track");
-    let glb = folder.join("track.glb");
-    let output = run("track", &[glb.to_str().unwrap()]).await;
+    let glb = concat!(env!("CARGO_TARGET_TMPDIR"), "/example_track/track.glb");
+    let output = run("track", &[glb]).await;
     // A slow machine may find none in the first frames.
-    assert!(output.contains("s: Replanned after"), "{output}");
-    assert!(output.contains("900 frames, "), "{output}");
+    assert!(
+        output.contains("s: Replanned after") && output.contains("900 frames, "),
+        "{output}"
+    );
     assert!(std::fs::read(glb).unwrap().starts_with(b"glTF"));
 }

@@ -1,269 +1,112 @@
-//! A tiny service whose behaviour is scripted, call by call.
+//! A tiny server that follows a script, whichever method is called.
 
 use std::{
     collections::VecDeque,
+    convert::Infallible,
     sync::{Arc, Mutex},
 };
 
-use grasp_client::v1::{
-    self,
-    grasp_service_server::{GraspService, GraspServiceServer},
-    object_service_server::{ObjectService, ObjectServiceServer},
-    upload_object_request::Part,
-};
-use tokio_stream::{Iter, Pending, wrappers::TcpListenerStream};
-use tonic::{Request, Response, Status, Streaming, transport::Server};
+use http::{HeaderMap, HeaderValue, Request, Response};
+use http_body_util::{BodyExt as _, Full};
+use prost::Message;
+use tokio_stream::wrappers::TcpListenerStream;
+use tonic::{Status, body::Body, codegen::Bytes, service::Routes, transport::Server};
 
-/// Response to one call.
+#[derive(Clone)]
 pub(crate) enum Act {
     Fail(Status),
-    Answer,
+    /// With messages, each after its length as gRPC frames them.
+    Answer(Vec<u8>),
     Hang,
 }
 
-/// Follows a script and records the deadlines of calls.
-#[derive(Clone, Default)]
+impl Act {
+    pub(crate) fn unavailable() -> Self {
+        Self::Fail(Status::unavailable("draining"))
+    }
+
+    pub(crate) fn answer<M: Message>(messages: &[M]) -> Self {
+        let mut body = Vec::new();
+        for message in messages {
+            body.push(0);
+            body.extend((message.encoded_len() as u32).to_be_bytes());
+            body.extend(message.encode_to_vec());
+        }
+        Self::Answer(body)
+    }
+}
+
+#[derive(Clone)]
+pub(crate) struct Call {
+    /// The header `grpc-timeout`.
+    pub(crate) timeout: String,
+    body: Bytes,
+}
+
+impl Call {
+    /// The messages of the request.
+    pub(crate) fn messages<M: Message + Default>(&self) -> Vec<M> {
+        let (mut rest, mut messages) = (&self.body[..], Vec::new());
+        while let Some((header, after)) = rest.split_first_chunk::<5>() {
+            let length = u32::from_be_bytes([header[1], header[2], header[3], header[4]]);
+            let (message, after) = after.split_at(length as usize);
+            messages.push(M::decode(message).unwrap());
+            rest = after;
+        }
+        messages
+    }
+}
+
+#[derive(Clone)]
 pub(crate) struct Scripted {
     script: Arc<Mutex<VecDeque<Act>>>,
-    pub(crate) grpc_timeouts: Arc<Mutex<Vec<String>>>,
-    /// The ids of requests to create objects.
-    pub(crate) request_ids: Arc<Mutex<Vec<String>>>,
-    /// Whether the second page of objects repeats its own token.
-    pub(crate) repeats_page_token: bool,
-    /// The mesh of every object.
-    pub(crate) mesh: Vec<u8>,
-    /// The mesh that was uploaded.
-    pub(crate) uploaded: Arc<Mutex<Vec<u8>>>,
+    calls: Arc<Mutex<Vec<Call>>>,
 }
 
 impl Scripted {
     pub(crate) fn new(script: impl IntoIterator<Item = Act>) -> Self {
         Self {
             script: Arc::new(Mutex::new(script.into_iter().collect())),
-            ..Self::default()
+            calls: Arc::default(),
         }
     }
 
-    async fn act<T>(&self, request: &Request<T>) -> Result<(), Status> {
-        if let Some(timeout) = request.metadata().get("grpc-timeout") {
-            let timeout = timeout.to_str().unwrap().to_owned();
-            self.grpc_timeouts.lock().unwrap().push(timeout);
-        }
-        let act = self.script.lock().unwrap().pop_front();
-        match act.expect("the script covers every call") {
-            Act::Fail(status) => Err(status),
-            Act::Answer => Ok(()),
-            Act::Hang => std::future::pending().await,
-        }
-    }
-
-    pub(crate) fn calls(&self) -> usize {
-        self.grpc_timeouts.lock().unwrap().len()
+    pub(crate) fn calls(&self) -> Vec<Call> {
+        self.calls.lock().unwrap().clone()
     }
 
     /// Serves on a free port until the test's runtime ends; returns the URL.
     pub(crate) async fn serve(&self) -> String {
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let address = listener.local_addr().unwrap();
-        let (_, health_service) = tonic_health::server::health_reporter();
-        let router = Server::builder()
-            .add_service(health_service)
-            .add_service(GraspServiceServer::new(self.clone()))
-            .add_service(ObjectServiceServer::new(self.clone()));
-        tokio::spawn(router.serve_with_incoming(TcpListenerStream::new(listener)));
-        format!("http://{address}")
-    }
-}
-
-#[tonic::async_trait]
-impl GraspService for Scripted {
-    async fn find_grasp(
-        &self,
-        request: Request<v1::FindGraspRequest>,
-    ) -> Result<Response<v1::FindGraspResponse>, Status> {
-        self.act(&request).await?;
-        Ok(Response::new(v1::FindGraspResponse {
-            outcome: v1::Outcome::BudgetExhausted.into(),
-            report: Some(v1::SearchReport {
-                attempts: 5,
-                limits: vec![v1::Verdict {
-                    check: v1::Check::Mass.into(),
-                    value: Some(80.0),
-                    bound: Some(70.0),
-                    description: "mass: 80 kg".to_owned(),
-                    ..v1::Verdict::default()
-                }],
-                search_time: Some(prost_types::Duration::default()),
-                ..v1::SearchReport::default()
-            }),
-            ..v1::FindGraspResponse::default()
-        }))
-    }
-
-    type StreamGraspsStream = Pending<Result<v1::FindGraspResponse, Status>>;
-
-    async fn stream_grasps(
-        &self,
-        _: Request<v1::StreamGraspsRequest>,
-    ) -> Result<Response<Self::StreamGraspsStream>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    type TrackHoldoutStream = Pending<Result<v1::TrackAnswer, Status>>;
-
-    async fn track_holdout(
-        &self,
-        _: Request<Streaming<v1::TrackHoldoutRequest>>,
-    ) -> Result<Response<Self::TrackHoldoutStream>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    async fn create_track(&self, _: Request<v1::Track>) -> Result<Response<v1::Track>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    async fn push_frame(&self, _: Request<v1::TrackFrame>) -> Result<Response<v1::TrackAnswer>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    async fn delete_track(&self, _: Request<v1::DeleteTrackRequest>) -> Result<Response<()>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    async fn validate_grasp(
-        &self,
-        _: Request<v1::ValidateGraspRequest>,
-    ) -> Result<Response<v1::ValidateGraspResponse>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    async fn evaluate_holdout(
-        &self,
-        _: Request<v1::EvaluateHoldoutRequest>,
-    ) -> Result<Response<v1::EvaluateHoldoutResponse>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-}
-
-fn wire_object(name: &str) -> v1::GraspObject {
-    v1::GraspObject {
-        name: name.to_owned(),
-        center_of_mass: Some(v1::Vector3::default()),
-        bounding_box: Some(v1::BoxShape::default()),
-        create_time: Some(prost_types::Timestamp::default()),
-        update_time: Some(prost_types::Timestamp::default()),
-        ..v1::GraspObject::default()
-    }
-}
-
-/// The object that a request would create.
-fn created(request: v1::CreateObjectRequest) -> Response<v1::GraspObject> {
-    Response::new(wire_object(&request.object.unwrap_or_default().name))
-}
-
-#[tonic::async_trait]
-impl ObjectService for Scripted {
-    async fn create_object(
-        &self,
-        request: Request<v1::CreateObjectRequest>,
-    ) -> Result<Response<v1::GraspObject>, Status> {
-        let id = request.get_ref().request_id.clone();
-        self.request_ids.lock().unwrap().push(id);
-        self.act(&request).await?;
-        Ok(created(request.into_inner()))
-    }
-
-    async fn get_object(
-        &self,
-        request: Request<v1::GetObjectRequest>,
-    ) -> Result<Response<v1::GraspObject>, Status> {
-        self.act(&request).await?;
-        Ok(Response::new(wire_object(&request.into_inner().name)))
-    }
-
-    /// Three pages of one object each, named after the page token.
-    async fn list_objects(
-        &self,
-        request: Request<v1::ListObjectsRequest>,
-    ) -> Result<Response<v1::ListObjectsResponse>, Status> {
-        self.act(&request).await?;
-        let token = request.into_inner().page_token;
-        let next = match token.as_str() {
-            "" => "b",
-            "b" if self.repeats_page_token => "b",
-            "b" => "c",
-            "c" => "",
-            other => panic!("token {other:?} was never given"),
-        };
-        Ok(Response::new(v1::ListObjectsResponse {
-            objects: vec![wire_object(&format!("objects/{token}"))],
-            next_page_token: next.to_owned(),
-        }))
-    }
-
-    async fn update_object(
-        &self,
-        _: Request<v1::UpdateObjectRequest>,
-    ) -> Result<Response<v1::GraspObject>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    async fn delete_object(&self, _: Request<v1::DeleteObjectRequest>) -> Result<Response<()>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    async fn upload_object(
-        &self,
-        request: Request<Streaming<v1::UploadObjectRequest>>,
-    ) -> Result<Response<v1::GraspObject>, Status> {
-        self.act(&request).await?;
-        let mut parts = request.into_inner();
-        let mut object = v1::CreateObjectRequest::default();
-        while let Some(part) = parts.message().await? {
-            match part.part {
-                Some(Part::Create(create)) => {
-                    self.request_ids.lock().unwrap().push(create.request_id.clone());
-                    object = create;
-                }
-                Some(Part::Piece(piece)) => self.uploaded.lock().unwrap().extend(piece),
-                Some(Part::Sha256(_)) | None => {}
-            }
-        }
-        Ok(created(object))
-    }
-
-    type GetMeshStream = Iter<std::vec::IntoIter<Result<v1::GetMeshResponse, Status>>>;
-
-    async fn get_mesh(
-        &self,
-        request: Request<v1::GetMeshRequest>,
-    ) -> Result<Response<Self::GetMeshStream>, Status> {
-        self.act(&request).await?;
-        let pieces = self.mesh.chunks(128 << 10).enumerate();
-        let parts = pieces.map(|(place, piece)| {
-            Ok(v1::GetMeshResponse {
-                piece: piece.to_vec(),
-                etag: if place == 0 { "1".to_owned() } else { String::new() },
-            })
+        let url = format!("http://{}", listener.local_addr().unwrap());
+        let service = self.clone();
+        let layer = tower::layer::layer_fn(move |_: Routes| {
+            let service = service.clone();
+            tower::service_fn(move |request| service.clone().follow(request))
         });
-        Ok(Response::new(tokio_stream::iter(parts.collect::<Vec<_>>())))
+        let router = Server::builder().layer(layer).add_routes(Routes::default());
+        tokio::spawn(router.serve_with_incoming(TcpListenerStream::new(listener)));
+        url
     }
 
-    type WatchObjectsStream = Pending<Result<v1::WatchObjectsResponse, Status>>;
-
-    async fn watch_objects(
-        &self,
-        _: Request<v1::WatchObjectsRequest>,
-    ) -> Result<Response<Self::WatchObjectsStream>, Status> {
-        Err(Status::unimplemented("not scripted"))
-    }
-
-    async fn get_atlas(&self, request: Request<v1::GetAtlasRequest>) -> Result<Response<v1::Atlas>, Status> {
-        self.act(&request).await?;
-        let name = request.into_inner().name;
-        Ok(Response::new(v1::Atlas {
-            name,
-            ..v1::Atlas::default()
-        }))
+    async fn follow(self, request: Request<Body>) -> Result<Response<Body>, Infallible> {
+        let timeout = request.headers().get("grpc-timeout");
+        let timeout = timeout.map_or("", |timeout| timeout.to_str().unwrap()).to_owned();
+        let body = request.into_body().collect().await.unwrap().to_bytes();
+        self.calls.lock().unwrap().push(Call { timeout, body });
+        let act = self.script.lock().unwrap().pop_front();
+        Ok(match act.expect("the script covers every call") {
+            Act::Fail(status) => status.into_http(),
+            Act::Hang => std::future::pending().await,
+            Act::Answer(body) => {
+                let mut trailers = HeaderMap::new();
+                trailers.insert("grpc-status", HeaderValue::from_static("0"));
+                let body = Full::new(Bytes::from(body)).with_trailers(async { Some(Ok(trailers)) });
+                let mut response = Response::new(Body::new(body));
+                let grpc = HeaderValue::from_static("application/grpc");
+                response.headers_mut().insert("content-type", grpc);
+                response
+            }
+        })
     }
 }

@@ -1,6 +1,6 @@
 //! Hands with fewer fingers, as in cartoons: those that are left are spread over the palm and are thicker.
 
-use std::sync::Arc;
+use std::{ops::RangeInclusive, sync::Arc};
 
 use glam::Vec3;
 use grasp_assets::hands::{Hand, hand};
@@ -36,30 +36,39 @@ impl Shape {
         let skin = Arc::clone(skin);
         let fingers = style.fingers;
         if fingers.len() == 4 {
-            let bind = if style.bend > 0.0 {
+            let mut bind = if style.bend > 0.0 {
                 bent(rig, &skin.bind, style.bend)
             } else {
                 skin.bind.clone()
             };
-            return Self::thickened(skin, bind, style.thickness);
+            for joint in &mut bind.joints[index::FIRST_OF_DIGIT[0]..] {
+                joint.radius *= style.thickness;
+            }
+            let is_adult = bind == skin.bind;
+            let positions = if is_adult {
+                skin.positions.clone()
+            } else {
+                skin.posed(&bind)
+            };
+            return Self {
+                skin,
+                bind,
+                positions,
+            };
         }
         let mut bind = skin.bind.clone();
         let offsets = offsets(&skin.bind, fingers);
         let thickness = 1.0 + THICKER * (4 - fingers.len()) as f32;
-        for digit in Digit::ALL {
-            let joints = index::FIRST_OF_DIGIT[digit.index()]..=index::TIP_OF_DIGIT[digit.index()];
-            for (place, joint) in bind.joints[joints].iter_mut().enumerate() {
-                let [at_base, at_knuckle] = offsets[digit.index()];
-                joint.pose.position += if place == 0 { at_base } else { at_knuckle };
+        for (digit, offsets) in offsets.iter().enumerate() {
+            for (place, joint) in bind.joints[links(digit)].iter_mut().enumerate() {
+                joint.pose.position += offsets[place.min(1)];
                 joint.radius *= thickness;
             }
         }
         let mut positions = skin.posed(&bind);
         for digit in Digit::ALL[1..].iter().filter(|digit| !fingers.contains(digit)) {
             close(&skin, &bind, digit.index(), &mut positions);
-            for joint in
-                &mut bind.joints[index::FIRST_OF_DIGIT[digit.index()]..=index::TIP_OF_DIGIT[digit.index()]]
-            {
+            for joint in &mut bind.joints[links(digit.index())] {
                 joint.radius = 0.0;
             }
         }
@@ -69,24 +78,11 @@ impl Shape {
             positions,
         }
     }
+}
 
-    fn thickened(skin: Arc<Skin>, mut bind: HandJoints, thickness: f32) -> Self {
-        if bind == skin.bind && thickness == 1.0 {
-            return Self {
-                bind,
-                positions: skin.positions.clone(),
-                skin,
-            };
-        }
-        for joint in &mut bind.joints[index::FIRST_OF_DIGIT[0]..] {
-            joint.radius *= thickness;
-        }
-        Self {
-            positions: skin.posed(&bind),
-            skin,
-            bind,
-        }
-    }
+/// The joints of a digit.
+fn links(digit: usize) -> RangeInclusive<usize> {
+    index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]
 }
 
 /// The joints of a hand whose fingers are bent by an angle at each joint.
@@ -97,25 +93,18 @@ fn bent(rig: &Rig, bind: &HandJoints, bend: f32) -> HandJoints {
         angles.second_pitch = bend;
         angles.third_pitch = bend;
     }
-    let frame_from_wrist = thesis_from_openxr_frame(bind.joints[index::WRIST].pose);
-    HandJoints::of_pose(
-        rig,
-        &HandPose {
-            frame_from_wrist,
-            digits,
-        },
-    )
+    let pose = HandPose {
+        frame_from_wrist: thesis_from_openxr_frame(bind.joints[index::WRIST].pose),
+        digits,
+    };
+    HandJoints::of_pose(rig, &pose)
 }
 
 /// How far the metacarpal's base and the rest of each digit move: the fingers are spread evenly from where the first to where the
 /// last one of four is, and missing ones go with those next to them.
 fn offsets(bind: &HandJoints, fingers: &[Digit]) -> [[Vec3; 2]; 5] {
     let [bases, knuckles] = [0, 1].map(|place| {
-        [0, 1, 2, 3].map(|finger| {
-            bind.joints[index::FIRST_OF_DIGIT[finger + 1] + place]
-                .pose
-                .position
-        })
+        [1, 2, 3, 4].map(|digit| bind.joints[index::FIRST_OF_DIGIT[digit] + place].pose.position)
     });
     let last = (fingers.len() - 1) as f32;
     let mut offsets = [[Vec3::ZERO; 2]; 5];
@@ -141,15 +130,11 @@ fn close(skin: &Skin, bind: &HandJoints, digit: usize, positions: &mut [Vec3]) {
     let along = (knuckle.pose.position - base.pose.position).normalize_or(Vec3::Y);
     let centre = knuckle.pose.position - behind * along;
     let links = index::FIRST_OF_DIGIT[digit] + 1..=index::TIP_OF_DIGIT[digit];
-    for (position, (joints, weights)) in positions
-        .iter_mut()
-        .zip(skin.joint_indices.iter().zip(&skin.weights))
-    {
+    let joints = skin.joint_indices.iter().zip(&skin.weights);
+    for (position, (joints, weights)) in positions.iter_mut().zip(joints) {
         let moved = joints.iter().zip(weights);
-        let of_finger: f32 = moved
-            .filter(|(joint, _)| links.contains(&usize::from(**joint)))
-            .map(|(_, weight)| weight)
-            .sum();
+        let moved = moved.filter(|(joint, _)| links.contains(&usize::from(**joint)));
+        let of_finger: f32 = moved.map(|(_, weight)| weight).sum();
         let from_centre = *position - centre;
         if from_centre.length() > radius {
             let closed = centre + radius * from_centre.normalize_or(Vec3::Y);

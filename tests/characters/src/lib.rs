@@ -4,6 +4,7 @@ mod fingers;
 pub mod names;
 
 use glam::{Mat4, Quat, Vec3};
+use gltf::binary::{Glb, Header};
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
@@ -82,16 +83,15 @@ pub fn character_from_wrist(side: Handedness) -> Pose {
 
 /// The nearest ancestor of a joint that the style has.
 fn parent_of(joint: usize, has: impl Fn(usize) -> bool) -> usize {
-    let mut parent = joint;
-    loop {
-        parent = if index::FIRST_OF_DIGIT.contains(&parent) {
-            index::WRIST
-        } else {
-            parent - 1
-        };
-        if has(parent) {
-            return parent;
-        }
+    let parent = if index::FIRST_OF_DIGIT.contains(&joint) {
+        index::WRIST
+    } else {
+        joint - 1
+    };
+    if has(parent) {
+        parent
+    } else {
+        parent_of(parent, has)
     }
 }
 
@@ -104,35 +104,26 @@ fn odd_axes(joint: usize) -> Quat {
 impl Character {
     /// Writes a character whose hands are the adult's but for their size and fingers, bound and standing in the bind pose.
     pub fn new(style: &Style) -> Self {
+        let node = |name: &str, parent: Option<usize>, height: f32| Node {
+            name: name.to_owned(),
+            parent,
+            pose: Pose::from_position(height * Vec3::Y),
+        };
         let mut nodes = vec![
-            Node {
-                name: "Armature".to_owned(),
-                parent: None,
-                pose: Pose::IDENTITY,
-            },
-            Node {
-                name: "Hips".to_owned(),
-                parent: Some(0),
-                pose: Pose::from_position(Vec3::Y),
-            },
-            Node {
-                name: "Head".to_owned(),
-                parent: Some(1),
-                pose: Pose::from_position(1.6 * Vec3::Y),
-            },
+            node("Armature", None, 0.0),
+            node("Hips", Some(0), 1.0),
+            node("Head", Some(1), 1.6),
         ];
-        let mut positions: Vec<Vec3> = Vec::new();
-        let mut joints: Vec<[u16; 4]> = Vec::new();
-        let mut weights: Vec<[f32; 4]> = Vec::new();
-        let mut corners: Vec<u32> = Vec::new();
-        // The body: a box.
+        let mut body = Body::default();
+        // A box.
         for corner in 0..8_u32 {
             let side = |bit: u32| if corner >> bit & 1 == 0 { -0.2 } else { 0.2 };
-            positions.push(Vec3::new(side(0), 1.2 + 2.0 * side(1), 0.5 * side(2)));
-            joints.push([1, 0, 0, 0]);
-            weights.push([1.0, 0.0, 0.0, 0.0]);
+            body.positions
+                .push(Vec3::new(side(0), 1.2 + 2.0 * side(1), 0.5 * side(2)));
+            body.joints.push([1, 0, 0, 0]);
+            body.weights.push([1.0, 0.0, 0.0, 0.0]);
         }
-        corners.extend([0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6]);
+        body.corners.extend([0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6]);
         for &side in style.sides {
             let Shape {
                 skin,
@@ -171,66 +162,60 @@ impl Character {
                     pose: Pose::new(pose.position, pose.orientation * odd_axes(joint)),
                 });
             }
-            let first = positions.len() as u32;
-            positions.extend(
-                shaped
-                    .iter()
-                    .map(|&position| place(Pose::from_position(position)).position),
-            );
-            joints.extend(skin.joint_indices.iter().map(|indices| {
+            let first = body.positions.len() as u32;
+            let placed = shaped
+                .iter()
+                .map(|&position| place(Pose::from_position(position)).position);
+            body.positions.extend(placed);
+            body.joints.extend(skin.joint_indices.iter().map(|indices| {
                 indices.map(|joint| {
                     let joint = usize::from(joint).max(1);
                     let joint = if has(joint) { joint } else { parent_of(joint, has) };
                     node_of[joint] as u16
                 })
             }));
-            weights.extend(&skin.weights);
-            corners.extend(skin.triangles.iter().flatten().map(|corner| first + corner));
+            body.weights.extend(&skin.weights);
+            let corners = skin.triangles.as_flattened().iter();
+            body.corners.extend(corners.map(|corner| first + corner));
         }
-        Self {
-            glb: write(style, &nodes, &positions, &joints, &weights, &corners),
-        }
+        let glb = write(style, &nodes, &body);
+        Self { glb }
     }
 }
 
-fn write(
-    style: &Style,
-    nodes: &[Node],
-    positions: &[Vec3],
-    joints: &[[u16; 4]],
-    weights: &[[f32; 4]],
-    corners: &[u32],
-) -> Vec<u8> {
+/// What a skinned mesh consists of.
+#[derive(Default)]
+struct Body {
+    positions: Vec<Vec3>,
+    joints: Vec<[u16; 4]>,
+    weights: Vec<[f32; 4]>,
+    corners: Vec<u32>,
+}
+
+fn write(style: &Style, nodes: &[Node], body: &Body) -> Vec<u8> {
     let units = style.units_per_metre;
     let in_units = |pose: Pose| Pose::new(units * pose.position, pose.orientation);
-    let mut described: Vec<Value> = nodes
-        .iter()
-        .enumerate()
-        .map(|(place, node)| {
-            let parent = node.parent.map_or(Pose::IDENTITY, |parent| nodes[parent].pose);
-            let local = in_units(parent.inverse() * node.pose);
-            let children: Vec<usize> = (0..nodes.len())
-                .filter(|&child| nodes[child].parent == Some(place))
-                .collect();
-            let mut described = json!({
-                "name": node.name,
-                "translation": local.position.to_array(),
-                "rotation": local.orientation.to_array(),
-            });
-            if !children.is_empty() {
-                described["children"] = json!(children);
-            }
-            if place == 0 {
-                described["scale"] = json!([1.0 / units, 1.0 / units, 1.0 / units]);
-            }
-            described
-        })
-        .collect();
+    let describe = |(place, node): (usize, &Node)| {
+        let parent = node.parent.map_or(Pose::IDENTITY, |parent| nodes[parent].pose);
+        let local = in_units(parent.inverse() * node.pose);
+        let children = (0..nodes.len()).filter(|&child| nodes[child].parent == Some(place));
+        let children: Vec<usize> = children.collect();
+        let mut described = json!({
+            "name": node.name,
+            "translation": local.position.to_array(),
+            "rotation": local.orientation.to_array(),
+        });
+        if !children.is_empty() {
+            described["children"] = json!(children);
+        }
+        if place == 0 {
+            described["scale"] = json!(Vec3::splat(1.0 / units).to_array());
+        }
+        described
+    };
+    let mut described: Vec<Value> = nodes.iter().enumerate().map(describe).collect();
     described.push(json!({ "name": "Body", "mesh": 0, "skin": 0 }));
-    let bytes =
-        |numbers: &mut dyn Iterator<Item = f32>| numbers.flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
-    let positions_in_units = positions.iter().map(|&position| units * position);
-    let inverse_binds = nodes.iter().flat_map(|node| {
+    let inverse_binds = nodes.iter().map(|node| {
         let Pose {
             position,
             orientation,
@@ -239,50 +224,31 @@ fn write(
             .inverse()
             .to_cols_array()
     });
-    let blocks = [
-        (
-            bytes(&mut positions_in_units.flat_map(|v| v.to_array())),
-            5126,
-            "VEC3",
-            positions.len(),
-        ),
-        (
-            joints
-                .iter()
-                .flatten()
-                .flat_map(|joint| joint.to_le_bytes())
-                .collect(),
-            5123,
-            "VEC4",
-            joints.len(),
-        ),
-        (
-            bytes(&mut weights.iter().flatten().copied()),
-            5126,
-            "VEC4",
-            weights.len(),
-        ),
-        (
-            corners.iter().flat_map(|corner| corner.to_le_bytes()).collect(),
-            5125,
-            "SCALAR",
-            corners.len(),
-        ),
-        (bytes(&mut inverse_binds.into_iter()), 5126, "MAT4", nodes.len()),
+    let floats = |rows: &[f32]| -> Vec<u8> { rows.iter().flat_map(|number| number.to_le_bytes()).collect() };
+    let positions: Vec<[f32; 3]> = body.positions.iter().map(|&p| (units * p).to_array()).collect();
+    let weights = floats(body.weights.as_flattened());
+    let joints = body.joints.as_flattened().iter();
+    let joints = joints.flat_map(|joint| joint.to_le_bytes()).collect();
+    let corners = body.corners.iter();
+    let corners = corners.flat_map(|corner| corner.to_le_bytes()).collect();
+    let inverse_binds = floats(inverse_binds.collect::<Vec<_>>().as_flattened());
+    let blocks: [(Vec<u8>, u32, &str, usize); 5] = [
+        (floats(positions.as_flattened()), 5126, "VEC3", positions.len()),
+        (joints, 5123, "VEC4", body.joints.len()),
+        (weights, 5126, "VEC4", body.weights.len()),
+        (corners, 5125, "SCALAR", body.corners.len()),
+        (inverse_binds, 5126, "MAT4", nodes.len()),
     ];
     let mut buffer: Vec<u8> = Vec::new();
     let (mut views, mut accessors) = (Vec::new(), Vec::new());
     for (view, (block, component, kind, count)) in blocks.into_iter().enumerate() {
         views.push(json!({ "buffer": 0, "byteOffset": buffer.len(), "byteLength": block.len() }));
-        let mut accessor =
-            json!({ "bufferView": view, "componentType": component, "type": kind, "count": count });
-        if view == 0 {
-            accessor["min"] = json!([-1e6, -1e6, -1e6]);
-            accessor["max"] = json!([1e6, 1e6, 1e6]);
-        }
-        accessors.push(accessor);
+        accessors
+            .push(json!({ "bufferView": view, "componentType": component, "type": kind, "count": count }));
         buffer.extend(block);
     }
+    accessors[0]["min"] = json!(Vec3::splat(-1e6).to_array());
+    accessors[0]["max"] = json!(Vec3::splat(1e6).to_array());
     let names: Vec<String> = nodes.iter().map(|node| node.name.clone()).collect();
     let document = json!({
         "asset": { "version": "2.0" },
@@ -309,19 +275,16 @@ pub fn webxr_hand() -> Option<Vec<u8>> {
 }
 
 /// Packs a document and its buffer as GLB.
-pub fn glb(document: &Value, mut buffer: Vec<u8>) -> Vec<u8> {
-    let mut text = document.to_string().into_bytes();
-    text.resize(text.len().next_multiple_of(4), b' ');
-    buffer.resize(buffer.len().next_multiple_of(4), 0);
-    let length = 12 + 8 + text.len() + 8 + buffer.len();
-    let mut file = b"glTF".to_vec();
-    for number in [2, length as u32, text.len() as u32] {
-        file.extend(number.to_le_bytes());
-    }
-    file.extend(b"JSON");
-    file.extend(text);
-    file.extend((buffer.len() as u32).to_le_bytes());
-    file.extend(b"BIN\0");
-    file.extend(buffer);
-    file
+pub fn glb(document: &Value, buffer: Vec<u8>) -> Vec<u8> {
+    let header = Header {
+        magic: *b"glTF",
+        version: 2,
+        length: 0,
+    };
+    let file = Glb {
+        header,
+        json: document.to_string().into_bytes().into(),
+        bin: Some(buffer.into()),
+    };
+    file.to_vec().expect("writing to memory cannot fail")
 }

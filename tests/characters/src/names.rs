@@ -16,13 +16,6 @@ fn digit_of(joint: usize) -> Option<(usize, usize)> {
     Some((digit, index::TIP_OF_DIGIT[digit] - joint))
 }
 
-fn letter(side: Handedness) -> &'static str {
-    match side {
-        Handedness::Left => "l",
-        Handedness::Right => "r",
-    }
-}
-
 /// The name of a joint by patterns for the wrist and the joints of a digit from its tip back, separated by bars; `None` where a pattern is
 /// empty. "{s}" and "{S}" stand for "left" and "Left", "{l}" and "{L}" for "l" and "L", "{d}" and "{D}" for "pinky" and "Pinky", "{E}" for
 /// "Little", "{n}" for the digit's number and "{j}" for the joint's.
@@ -33,11 +26,12 @@ fn named(side: Handedness, joint: usize, patterns: &str) -> Option<String> {
         None if joint == index::WRIST => (patterns[0], 0),
         None => return None,
     };
+    let (side, letter) = (side_name(side), &side_name(side)[..1]);
     let marks = [
-        ("{s}", side_name(side).to_lowercase()),
-        ("{S}", side_name(side).to_owned()),
-        ("{l}", letter(side).to_owned()),
-        ("{L}", letter(side).to_uppercase()),
+        ("{s}", side.to_lowercase()),
+        ("{S}", side.to_owned()),
+        ("{l}", letter.to_lowercase()),
+        ("{L}", letter.to_owned()),
         ("{d}", DIGITS[digit].to_lowercase()),
         ("{D}", DIGITS[digit].to_owned()),
         ("{E}", ENGLISH_DIGITS[digit].to_owned()),
@@ -52,29 +46,20 @@ fn named(side: Handedness, joint: usize, patterns: &str) -> Option<String> {
 
 /// Mixamo: the wrist, and four joints per digit.
 pub fn mixamo(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "mixamorig:{S}Hand|mixamorig:{S}Hand{D}4|mixamorig:{S}Hand{D}3|mixamorig:{S}Hand{D}2|mixamorig:{S}Hand{D}1|",
-    )
+    let patterns = "mixamorig:{S}Hand|mixamorig:{S}Hand{D}4|mixamorig:{S}Hand{D}3|mixamorig:{S}Hand{D}2|mixamorig:{S}Hand{D}1|";
+    named(side, joint, patterns)
 }
 
 /// Unreal's mannequin: with metacarpals, without tips.
 pub fn unreal(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "hand_{l}||{d}_03_{l}|{d}_02_{l}|{d}_01_{l}|{d}_metacarpal_{l}",
-    )
+    let patterns = "hand_{l}||{d}_03_{l}|{d}_02_{l}|{d}_01_{l}|{d}_metacarpal_{l}";
+    named(side, joint, patterns)
 }
 
 /// Unity's humanoid: three joints per digit.
 pub fn unity(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "{S}Hand||{S}{E}Distal|{S}{E}Intermediate|{S}{E}Proximal|",
-    )
+    let patterns = "{S}Hand||{S}{E}Distal|{S}{E}Intermediate|{S}{E}Proximal|";
+    named(side, joint, patterns)
 }
 
 /// MANO: three joints per digit.
@@ -84,82 +69,56 @@ pub fn mano(side: Handedness, joint: usize) -> Option<String> {
 
 /// Names that say nothing.
 pub fn bone(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "bone.{l}.{j}||bone.{l}.{j}|bone.{l}.{j}|bone.{l}.{j}|",
-    )
+    let patterns = "bone.{l}.{j}||bone.{l}.{j}|bone.{l}.{j}|bone.{l}.{j}|";
+    named(side, joint, patterns)
 }
 
 /// Auto-Rig Pro: the bone in the palm has the number of the one after it.
 pub fn auto_rig(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "hand.{l}||c_{d}3.{l}|c_{d}2.{l}|{d}1.{l}|c_{d}1_base.{l}",
-    )
+    let patterns = "hand.{l}||c_{d}3.{l}|c_{d}2.{l}|{d}1.{l}|c_{d}1_base.{l}";
+    named(side, joint, patterns)
 }
 
 /// Blender's automatic numbers, of which the first bone has none, with a leaf at the end.
 pub fn blender(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "hand.{L}|{d}.{L}.003|{d}.{L}.002|{d}.{L}.001|{d}.{L}|",
-    )
+    let patterns = "hand.{L}|{d}.{L}.003|{d}.{L}.002|{d}.{L}.001|{d}.{L}|";
+    named(side, joint, patterns)
 }
 
 /// Numbers from zero beside the name of the bone in the palm, as in `SteamVR`.
 pub fn steam(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "wrist_{l}|finger_{d}_{l}_end|finger_{d}_2_{l}|finger_{d}_1_{l}|finger_{d}_0_{l}|finger_{d}_meta_{l}",
-    )
+    let patterns =
+        "wrist_{l}|finger_{d}_{l}_end|finger_{d}_2_{l}|finger_{d}_1_{l}|finger_{d}_0_{l}|finger_{d}_meta_{l}";
+    named(side, joint, patterns)
 }
 
 /// 3ds Max's Biped.
 pub fn biped(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "Bip001 {L} Hand|Bip001 {L} Finger{n}Nub|Bip001 {L} Finger{n}2|Bip001 {L} Finger{n}1|Bip001 {L} Finger{n}|",
-    )
+    let patterns = "Bip001 {L} Hand|Bip001 {L} Finger{n}Nub|Bip001 {L} Finger{n}2|Bip001 {L} Finger{n}1|Bip001 {L} Finger{n}|";
+    named(side, joint, patterns)
 }
 
 /// `VRoid`: three joints per digit.
 pub fn vroid(side: Handedness, joint: usize) -> Option<String> {
-    named(
-        side,
-        joint,
-        "J_Bip_{L}_Hand||J_Bip_{L}_{E}3|J_Bip_{L}_{E}2|J_Bip_{L}_{E}1|",
-    )
+    let patterns = "J_Bip_{L}_Hand||J_Bip_{L}_{E}3|J_Bip_{L}_{E}2|J_Bip_{L}_{E}1|";
+    named(side, joint, patterns)
 }
 
 /// Quest's hands: with tips.
 pub fn quest(side: Handedness, joint: usize) -> Option<String> {
-    let base = if joint == index::FIRST_OF_DIGIT[4] {
-        "b_{l}_pinky0"
-    } else {
-        ""
-    };
-    named(
-        side,
-        joint,
-        &format!("b_{{l}}_wrist|b_{{l}}_{{d}}_null|b_{{l}}_{{d}}3|b_{{l}}_{{d}}2|b_{{l}}_{{d}}1|{base}"),
-    )
+    let has_base = joint == index::FIRST_OF_DIGIT[4];
+    let base = if has_base { "b_{l}_pinky0" } else { "" };
+    let patterns = "b_{l}_wrist|b_{l}_{d}_null|b_{l}_{d}3|b_{l}_{d}2|b_{l}_{d}1|";
+    named(side, joint, &format!("{patterns}{base}"))
 }
 
 /// Numbers from the bone in the palm to the last one, and the thumb's from 1 to 3: four bones of which the first does not bend.
 pub fn numbered_from_palm(side: Handedness, joint: usize) -> Option<String> {
-    match digit_of(joint) {
-        Some((0, _)) => unreal(side, joint),
-        _ => named(
-            side,
-            joint,
-            "hand_{l}||{d}_04_{l}|{d}_03_{l}|{d}_02_{l}|{d}_01_{l}",
-        ),
+    if let Some((0, _)) = digit_of(joint) {
+        return unreal(side, joint);
     }
+    let patterns = "hand_{l}||{d}_04_{l}|{d}_03_{l}|{d}_02_{l}|{d}_01_{l}";
+    named(side, joint, patterns)
 }
 
 /// The same with an end: five bones.
@@ -184,20 +143,12 @@ fn vrm_bones(names: &[String], thumb: [&str; 3]) -> Vec<(String, usize)> {
             let Some(name) = bone(side, joint) else { continue };
             let node = names.iter().position(|other| *other == name).unwrap();
             let prefix = side_name(side).to_lowercase();
-            bones.push(match digit_of(joint) {
-                None => (format!("{prefix}Hand"), node),
-                Some((digit, back)) => {
-                    let segments = if digit == 0 {
-                        thumb
-                    } else {
-                        ["Proximal", "Intermediate", "Distal"]
-                    };
-                    (
-                        format!("{prefix}{}{}", ENGLISH_DIGITS[digit], segments[3 - back]),
-                        node,
-                    )
-                }
+            let fingers = ["Proximal", "Intermediate", "Distal"];
+            let part = digit_of(joint).map_or("Hand".to_owned(), |(digit, back)| {
+                let segments = if digit == 0 { thumb } else { fingers };
+                format!("{}{}", ENGLISH_DIGITS[digit], segments[3 - back])
             });
+            bones.push((format!("{prefix}{part}"), node));
         }
     }
     bones
@@ -206,20 +157,20 @@ fn vrm_bones(names: &[String], thumb: [&str; 3]) -> Vec<(String, usize)> {
 /// The extension of VRM 0.x, which says which joints nodes with the names of [`bone`] are.
 pub fn vrm_0(names: &[String]) -> Value {
     let bones = vrm_bones(names, ["Proximal", "Intermediate", "Distal"]);
-    let bones: Vec<Value> = bones
+    let bones = bones
         .iter()
-        .map(|(bone, node)| json!({ "bone": bone, "node": node }))
-        .collect();
+        .map(|(bone, node)| json!({ "bone": bone, "node": node }));
+    let bones: Vec<Value> = bones.collect();
     json!({ "VRM": { "specVersion": "0.0", "humanoid": { "humanBones": bones } } })
 }
 
 /// The same of VRM 1.0.
 pub fn vrm_1(names: &[String]) -> Value {
     let bones = vrm_bones(names, ["Metacarpal", "Proximal", "Distal"]);
-    let bones: serde_json::Map<String, Value> = bones
+    let bones = bones
         .into_iter()
-        .map(|(bone, node)| (bone, json!({ "node": node })))
-        .collect();
+        .map(|(bone, node)| (bone, json!({ "node": node })));
+    let bones: serde_json::Map<String, Value> = bones.collect();
     json!({ "VRMC_vrm": { "specVersion": "1.0", "humanoid": { "humanBones": bones } } })
 }
 

@@ -76,7 +76,6 @@ pub(super) fn read_folder(path: &Path) -> Result<Vec<FolderObject>, Failure> {
     Ok(found)
 }
 
-/// An object to create.
 pub(super) struct NewObject {
     pub request: v1::CreateObjectRequest,
     /// What its mass was computed with; `None` if a manifest has the mass.
@@ -90,25 +89,18 @@ pub(super) struct NewObject {
 pub(super) fn new_object(file: FolderObject) -> Result<NewObject, String> {
     let id = id_from_file(&file.mesh);
     let mesh = std::fs::read(&file.mesh).map_err(|error| format!("cannot be read: {error}"))?;
-    let Some(manifest) = file.manifest else {
-        let read = read_mesh(&mesh, Import::METRES, MESH_LIMITS).map_err(|errors| joined("; ", errors))?;
-        let density = density(&read);
-        return Ok(NewObject {
-            request: v1::CreateObjectRequest::new(id, mesh, mass(&read, &density)),
-            density: Some(density),
-        });
-    };
-    let request = v1::CreateObjectRequest {
-        object: Some(v1::GraspObject {
-            name: format!("objects/{id}"),
-            ..manifest
-        }),
-        mesh,
-        request_id: String::new(),
-    };
+    if let Some(manifest) = file.manifest {
+        let mut request = v1::CreateObjectRequest::new(id, mesh, manifest.mass_kg);
+        let name = std::mem::take(&mut request.object_mut().name);
+        *request.object_mut() = v1::GraspObject { name, ..manifest };
+        let density = None;
+        return Ok(NewObject { request, density });
+    }
+    let read = read_mesh(&mesh, Import::METRES, MESH_LIMITS).map_err(|errors| joined("; ", errors))?;
+    let density = density(&read);
     Ok(NewObject {
-        request,
-        density: None,
+        request: v1::CreateObjectRequest::new(id, mesh, mass(&read, &density)),
+        density: Some(density),
     })
 }
 
@@ -116,10 +108,7 @@ pub(super) fn new_object(file: FolderObject) -> Result<NewObject, String> {
 fn density(read: &ImportedMesh) -> Density {
     let mut largest = (0.0, None);
     for (name, triangles) in &read.groups {
-        let area = triangles
-            .iter()
-            .map(|&triangle| area(read, triangle as usize))
-            .sum();
+        let area = triangles.iter().map(|&triangle| area(read, triangle)).sum();
         if let Some(known) = density_of_name(name)
             && area >= largest.0
         {
@@ -132,7 +121,6 @@ fn density(read: &ImportedMesh) -> Density {
     })
 }
 
-/// The mass in kilograms of a mesh in metres.
 fn mass(read: &ImportedMesh, density: &Density) -> f32 {
     let mesh = &read.mesh;
     let volume = match mesh.volume_centroid() {
@@ -152,8 +140,8 @@ fn density_of_name(name: &str) -> Option<Density> {
     })
 }
 
-fn area(read: &ImportedMesh, triangle: usize) -> f64 {
-    let [a, b, c] = read.mesh.corners(triangle).map(Vec3::as_dvec3);
+fn area(read: &ImportedMesh, triangle: u32) -> f64 {
+    let [a, b, c] = read.mesh.corners(triangle as usize).map(Vec3::as_dvec3);
     (b - a).cross(c - a).length() / 2.0
 }
 

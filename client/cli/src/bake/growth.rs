@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use grasp_client::{
-    ClientError, GraspChoice, GraspClient, Handedness, Outcome,
+    ClientError, Code, GraspChoice, GraspClient, Handedness, Outcome,
     v1::{self, Atlas, AtlasGrowth, GraspObject, receiver::Body},
 };
 use grasp_server::FolderObject;
@@ -14,7 +14,7 @@ use uuid::Builder;
 use super::{Givers, Grips, Row};
 use crate::{
     Failure,
-    bake::folder::new_object,
+    bake::folder::{NewObject, new_object},
     blocking,
     input::id_from_file,
     objects::atlas_of,
@@ -39,44 +39,46 @@ pub(super) async fn register(
         mesh: mesh.to_string_lossy().into_owned(),
         ..Row::default()
     };
-    let mut object = match blocking(move || Ok(new_object(file))).await? {
-        Ok(made) => {
-            row.density = made.density;
-            made.request
-        }
+    let NewObject { request, density } = match blocking(move || Ok(new_object(file))).await? {
+        Ok(new) => new,
         Err(wrong) => {
             row.error = Some(wrong);
             return Ok(row);
         }
     };
+    row.density = density;
+    let mut object = request;
     object.request_id = request_id(&object);
     let before = match client.get_object(&row.name).await {
-        Err(ClientError::NotFound(_)) => None,
+        Err(error) if error.code() == Some(Code::NotFound) => None,
         before => Some(before?),
     };
-    let created = match client.create_object(&object).await {
-        Err(ClientError::AlreadyExists(_)) if replace => {
-            client.delete_object(&row.name, None).await?;
-            client.create_object(&object).await
-        }
-        created => created,
-    };
-    match created {
+    let mut created = client.create_object(&object).await;
+    let exists = |error: &ClientError| error.code() == Some(Code::AlreadyExists);
+    if replace && created.as_ref().is_err_and(exists) {
+        client.delete_object(&row.name, None).await?;
+        created = client.create_object(&object).await;
+    }
+    let error = match created {
         Ok(created) => {
             row.created = before.is_none_or(|before| before.create_time != created.create_time);
             describe(client, &mut row, &created).await?;
+            return Ok(row);
         }
-        Err(ClientError::AlreadyExists(_)) => {
-            row.error = Some("was created from another file; --replace deletes that object first".to_owned());
+        Err(error) => error,
+    };
+    row.error = Some(match error.call() {
+        Some(call) if call.code == Code::AlreadyExists => {
+            "was created from another file; --replace deletes that object first".to_owned()
         }
-        Err(ClientError::InvalidArgument(call) | ClientError::FailedPrecondition(call)) => {
-            let violations = call.details.field_violations.iter();
+        Some(call) if matches!(call.code, Code::InvalidArgument | Code::FailedPrecondition) => {
+            let violations = call.violations().iter();
             let all = violations.map(|wrong| format!("{}: {}", wrong.field, wrong.description));
             let all = joined("; ", all);
-            row.error = Some(if all.is_empty() { call.message } else { all });
+            if all.is_empty() { call.message.clone() } else { all }
         }
-        Err(error) => return Err(error.into()),
-    }
+        _ => return Err(error.into()),
+    });
     Ok(row)
 }
 
@@ -89,15 +91,14 @@ fn request_id(request: &v1::CreateObjectRequest) -> String {
     Builder::from_custom_bytes(bytes).into_uuid().to_string()
 }
 
-/// Takes over what the server says of an object and of its atlases.
 async fn describe(client: &GraspClient, row: &mut Row, object: &GraspObject) -> Result<(), Failure> {
     row.mass_kg = Some(object.mass_kg);
     row.triangles = Some(object.triangle_count);
     row.warnings.clone_from(&object.warnings);
-    let mut atlases = [Atlas::default(), Atlas::default()];
-    for (atlas, hand) in atlases.iter_mut().zip(["right", "left"]) {
-        *atlas = atlas_of(client, &row.name, hand).await?;
-    }
+    let atlases = [
+        atlas_of(client, &row.name, "right").await?,
+        atlas_of(client, &row.name, "left").await?,
+    ];
     row.growth = why_not_growing(&atlases);
     let are_kept = atlases
         .iter()
@@ -136,7 +137,7 @@ pub(super) async fn is_done(
 ) -> Result<bool, Failure> {
     let before = row.grips;
     match client.get_object(&row.name).await {
-        Err(ClientError::NotFound(_)) => {
+        Err(error) if error.code() == Some(Code::NotFound) => {
             row.error = Some("was deleted or evicted meanwhile".to_owned());
             return Ok(true);
         }

@@ -125,14 +125,11 @@ async fn bake(
     Ok(done.into_iter().map(|(_, row)| row).collect())
 }
 
-/// What became of a mesh.
 #[derive(Clone, Debug, Default, Serialize)]
 struct Row {
     /// "objects/{object}".
     name: String,
-    /// The file's name.
     mesh: String,
-    /// True if this run created it.
     created: bool,
     /// Its mass in kilograms; `None` if it was rejected.
     mass_kg: Option<f32>,
@@ -146,20 +143,15 @@ struct Row {
     stalled: bool,
     /// Why atlases do not grow, as far as the server says.
     growth: Option<String>,
-    /// What test givers showed.
     givers: Givers,
     /// If it got no grips or was taken from no giver: what keeps hands from the object alone; `None` if they can hold it.
     in_the_way: Option<String>,
-    /// Oddities of the mesh.
     warnings: Vec<String>,
-    /// Why it was rejected.
     error: Option<String>,
 }
 
-/// The state of one hand's atlas.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 struct Grips {
-    /// Number of grips.
     entries: u32,
     /// True if it does not grow any more.
     complete: bool,
@@ -186,21 +178,17 @@ impl Row {
 
     /// True if the server keeps atlases, and a hand has no grips.
     fn lacks_grips(&self) -> bool {
-        let is_lacking = |grips: [Grips; 2]| grips.iter().any(|hand| hand.entries == 0);
-        self.grips.is_some_and(is_lacking)
+        self.grips
+            .is_some_and(|grips| grips.iter().any(|hand| hand.entries == 0))
     }
 
     /// What is odd about it, and why it has no more grips or givers.
     fn notes(&self) -> String {
-        let Givers {
-            requested,
-            tried,
-            answered,
-            ref last_failure,
-        } = self.givers;
+        let givers = &self.givers;
+        let (requested, tried, answered) = (givers.requested, givers.tried, givers.answered);
         let has_ceased = self.stalled || self.lacks_grips();
         let growth = self.growth.as_ref().filter(|_| has_ceased);
-        let failure = last_failure.as_ref().filter(|_| answered < tried);
+        let failure = givers.last_failure.as_ref().filter(|_| answered < tried);
         let notes = [
             self.error.clone(),
             growth.map(|why| format!("its atlases do not grow: {why}")),
@@ -212,7 +200,6 @@ impl Row {
     }
 }
 
-/// The table, for people.
 fn describe(rows: &[Row]) -> String {
     let mut all = table("object |  | >mass | density | >triangles | >grips r + l | >givers | notes");
     for row in rows {

@@ -16,7 +16,6 @@ const STEPS: [&str; 5] = [
     "immobility validation",
 ];
 
-/// The whole answer as text.
 pub(super) fn describe(
     request: &v1::FindGraspRequest,
     answer: &v1::FindGraspResponse,
@@ -128,17 +127,14 @@ fn describe_arm(arm: &v1::Arm) -> String {
         let v1::Vector3 { x, y, z } = point.unwrap_or_default();
         format!("{x:.3}, {y:.3}, {z:.3}")
     };
-    let bent = |radians: f32, positive: &'static str, negative: &'static str| {
-        let toward = if radians < 0.0 { negative } else { positive };
-        format!("{:.0}° {toward}", radians.to_degrees().abs())
+    let bent = |radians: f32, ways: [&str; 2]| {
+        let way = ways[usize::from(radians < 0.0)];
+        format!("{:.0}° {way}", radians.to_degrees().abs())
     };
     let (shoulder, elbow) = (point(arm.client_shoulder), point(arm.client_elbow));
-    let flexion = bent(arm.wrist_flexion, "flexed", "extended");
-    let deviation = bent(
-        arm.wrist_deviation,
-        "toward the little finger",
-        "toward the thumb",
-    );
+    let flexion = bent(arm.wrist_flexion, ["flexed", "extended"]);
+    let sides = ["toward the little finger", "toward the thumb"];
+    let deviation = bent(arm.wrist_deviation, sides);
     format!("shoulder {shoulder}, elbow {elbow} m, wrist {flexion} and {deviation}")
 }
 

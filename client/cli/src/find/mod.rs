@@ -55,7 +55,6 @@ const BEND_RATIOS: [Choice<BendRatios>; 6] = [
     ("only-high", BendRatios::OnlyHigh, "Only 1.42"),
 ];
 
-/// Which valid grasp is returned.
 const CHOICES: [Choice<GraspChoice>; 2] = [
     ("first", GraspChoice::FirstValid, "The first one found"),
     (
@@ -65,7 +64,6 @@ const CHOICES: [Choice<GraspChoice>; 2] = [
     ),
 ];
 
-/// What grasps differ by.
 const DIFFERENCES: [Choice<DifferBy>; 3] = [
     (
         "approach",
@@ -231,7 +229,6 @@ impl Arguments {
         Ok(request)
     }
 
-    /// What is streamed, if anything.
     fn sent(&self) -> Option<Sent> {
         if let Some(count) = self.alternatives {
             let differ_by = self.differ_by.iter().map(|&what| what.into()).collect();
@@ -250,13 +247,10 @@ impl Arguments {
             return Ok(None);
         }
         let convention = request.output.as_ref().map(v1::OutputOptions::convention);
-        if !matches!(
-            convention,
-            None | Some(Convention::Unspecified | Convention::Openxr)
-        ) {
-            return Err(Failure::usage(
-                "pictures require a request in the openxr convention",
-            ));
+        let convention = convention.unwrap_or_default();
+        if !matches!(convention, Convention::Unspecified | Convention::Openxr) {
+            let why = "pictures require a request in the openxr convention";
+            return Err(Failure::usage(why));
         }
         let holdout = request.holdout.clone().unwrap_or_default();
         let model = self.model.as_deref().map(read_file).transpose()?;
@@ -268,7 +262,6 @@ impl Arguments {
         }))
     }
 
-    /// Draws grasps into the files; a number is added to their names.
     async fn draw(
         &self,
         drawing: &Handover,
@@ -290,7 +283,6 @@ impl Arguments {
         .await
     }
 
-    /// Shows a stream, and draws each grasp.
     async fn show_stream(
         &self,
         client: &GraspClient,
@@ -370,11 +362,12 @@ fn numbered(path: &Path, number: Option<usize>) -> PathBuf {
     let Some(number) = number else {
         return path.to_owned();
     };
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = match path.extension() {
-        Some(extension) => format!("{stem}-{number}.{}", extension.to_string_lossy()),
-        None => format!("{stem}-{number}"),
-    };
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
     path.with_file_name(name)
 }
 
@@ -391,12 +384,14 @@ fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> Strin
         GraspSource::Unspecified => String::new(),
         source => name_of(source),
     };
+    let after = human_time(found.search_time().as_secs_f64());
+    let (number, grasp_type) = (number.to_string(), grasp_type_name(grasp));
     line([
-        &number.to_string(),
+        &number,
         &score,
-        &human_time(found.search_time().as_secs_f64()),
+        &after,
         &hand.unwrap_or_default(),
-        &grasp_type_name(grasp),
+        &grasp_type,
         &source,
     ])
 }

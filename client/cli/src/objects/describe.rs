@@ -14,7 +14,6 @@ use crate::{
     output::{list, name_of, pairs, warnings, write_line, write_message, yes_or_no},
 };
 
-/// What a file of regions looks like.
 pub(super) const REGIONS: &str = r#"A file of regions is a list of the API's Region in protobuf's JSON; in each, "name" and "preference" are required, and one of
 "groups", "triangles" and "shapes":
   [{"name": "handle", "preference": "PREFERENCE_PREFERRED", "weight": 0.8, "groups": ["grip"], "triangles": [7],
@@ -23,7 +22,6 @@ pub(super) const REGIONS: &str = r#"A file of regions is a list of the API's Reg
    {"name": "blade", "preference": "PREFERENCE_FORBIDDEN", "shapes": [{"tube": {"points": [{}], "radii": [0.03]}},
      {"box": {"pose": {"position": {"y": 0.1}}, "halfExtents": {"x": 0.01, "y": 0.05, "z": 0.02}}}]}]"#;
 
-/// What a file of known grips looks like.
 pub(super) const KNOWN_GRIPS: &str = r#"A file of known grips is a list of the API's KnownGrip in protobuf's JSON; digits are for preferred ones, "near…" for forbidden
 ones. "hand" of a grasp in the output of `grasp find --json` can be taken as it is:
   [{"name": "by the handle", "preference": "PREFERENCE_PREFERRED", "hand": {
@@ -69,13 +67,11 @@ pub(super) fn labels(labels: &BTreeMap<String, String>) -> String {
     }))
 }
 
-/// Its friction, if it has its own.
 pub(super) fn friction(object: &v1::GraspObject) -> String {
     let own = object.friction.map(|friction| friction.to_string());
     own.unwrap_or_else(|| "default".to_owned())
 }
 
-/// Shows everything about an object.
 pub(super) async fn show(
     client: &GraspClient,
     object: &v1::GraspObject,
@@ -122,7 +118,6 @@ fn describe(object: &v1::GraspObject, of_right: &v1::Atlas) -> String {
     pairs(&lines)
 }
 
-/// Names and preferences of regions.
 fn list_regions(regions: &[v1::Region]) -> String {
     list(regions.iter().map(|region| {
         let (name, preference) = (&region.name, name_of(region.preference()));
@@ -133,7 +128,6 @@ fn list_regions(regions: &[v1::Region]) -> String {
     }))
 }
 
-/// Names and preferences of known grips.
 fn list_known_grips(grips: &[v1::KnownGrip]) -> String {
     let named = |grip: &v1::KnownGrip| format!("{} ({})", grip.name, name_of(grip.preference()));
     list(grips.iter().map(named))
@@ -153,12 +147,7 @@ mod tests {
 
     #[test]
     fn atlas_state_shows_growth() {
-        let state = |entry_count, growth: AtlasGrowth| v1::Atlas {
-            entry_count,
-            growth: growth.into(),
-            ..v1::Atlas::default()
-        };
-        for (entries, growth, expected) in [
+        for (entry_count, growth, expected) in [
             (0, AtlasGrowth::Unspecified, "none"),
             (120, AtlasGrowth::Growing, "120 grips so far"),
             (120, AtlasGrowth::Unspecified, "120 grips so far"),
@@ -170,13 +159,15 @@ mod tests {
             (0, AtlasGrowth::NoMemory, "no memory"),
             (0, AtlasGrowth::Failed, "failed"),
         ] {
-            assert_eq!(atlas_state(&state(entries, growth)), expected);
+            let mut atlas = v1::Atlas {
+                entry_count,
+                growth: growth.into(),
+                ..v1::Atlas::default()
+            };
+            assert_eq!(atlas_state(&atlas), expected);
+            atlas.learned_count = 2;
+            assert_eq!(atlas_state(&atlas), format!("{expected}, 2 learned"));
         }
-        let learned = v1::Atlas {
-            learned_count: 2,
-            ..state(120, AtlasGrowth::Complete)
-        };
-        assert_eq!(atlas_state(&learned), "120 grips, 2 learned");
     }
 
     #[test]

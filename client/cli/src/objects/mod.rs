@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{ArgAction, Args, Subcommand};
 use glam::Vec3;
 use grasp_client::{
-    ClientError, GraspClient, Preference,
+    ClientError, Code, GraspClient, Preference,
     v1::{
         self, Atlas, Handedness, ListObjectsRequest, ListObjectsResponse, ObjectChange, ObjectView,
         WatchObjectsResponse,
@@ -115,7 +115,7 @@ async fn atlases(client: &GraspClient, name: &str, output: Output) -> Result<(),
 /// The state of an object's atlas for its "left" or "right" hand; an empty one if the object is gone.
 pub(crate) async fn atlas_of(client: &GraspClient, object: &str, hand: &str) -> Result<Atlas, ClientError> {
     match client.get_atlas(format!("{object}/atlases/{hand}")).await {
-        Err(ClientError::NotFound(_)) => Ok(Atlas::default()),
+        Err(error) if error.code() == Some(Code::NotFound) => Ok(Atlas::default()),
         atlas => atlas,
     }
 }
@@ -311,9 +311,8 @@ struct UpdateArguments {
 async fn update(arguments: UpdateArguments, server: &ServerOptions, output: Output) -> Result<(), Failure> {
     let fields = arguments.fields();
     if fields.is_empty() {
-        return Err(Failure::usage(
-            "nothing to change; give a unit, mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels",
-        ));
+        let why = "nothing to change; give a unit, mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels";
+        return Err(Failure::usage(why));
     }
     let change = v1::GraspObject {
         etag: arguments.etag.unwrap_or_default(),
@@ -328,7 +327,6 @@ async fn update(arguments: UpdateArguments, server: &ServerOptions, output: Outp
 }
 
 impl UpdateArguments {
-    /// The fields to change.
     fn fields(&self) -> Vec<&'static str> {
         let given = &self.properties;
         let has_centre = given.centre_of_mass.is_some() || self.default_centre_of_mass;
@@ -346,10 +344,6 @@ impl UpdateArguments {
         fields.map(|(field, _)| field).collect()
     }
 }
-
-/// Widths of the columns, which cannot follow rows that are yet to come.
-const CHANGES_WIDTH: usize = 22;
-const NAME_WIDTH: usize = 28;
 
 /// Show what happens to objects, until interrupted or the server shuts down.
 ///
@@ -388,14 +382,11 @@ async fn watch(client: &GraspClient, arguments: WatchArguments, output: Output) 
     Ok(())
 }
 
-/// A row of the table.
 fn row(news: &WatchObjectsResponse) -> String {
     let changes = listed(news.changes().map(name_of));
     let object = news.object.clone().unwrap_or_default();
-    if matches!(
-        news.changes().next_back(),
-        Some(ObjectChange::Deleted | ObjectChange::Evicted)
-    ) {
+    let last = news.changes().next_back();
+    if matches!(last, Some(ObjectChange::Deleted | ObjectChange::Evicted)) {
         return line(&changes, &object.name, "", "", "");
     }
     let mass = format!("{:.0} g", object.mass_kg * 1000.0);
@@ -414,8 +405,9 @@ fn of_hand(atlas: &Atlas, count: usize) -> String {
     }
 }
 
+/// A row, whose widths cannot follow rows that are yet to come.
 fn line(changes: &str, name: &str, mass: &str, atlas: &str, labels: &str) -> String {
-    let line = format!("{changes:CHANGES_WIDTH$}  {name:NAME_WIDTH$}  {mass:>7}  {atlas:18}  {labels}");
+    let line = format!("{changes:22}  {name:28}  {mass:>7}  {atlas:18}  {labels}");
     line.trim_end().to_owned()
 }
 

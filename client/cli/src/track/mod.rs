@@ -89,7 +89,6 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
-/// A motion to play.
 #[derive(Debug)]
 struct Motion {
     track: Track,
@@ -120,7 +119,10 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     };
     let mut track = client.track(&motion.track).await?;
     let mut played = Played {
-        tally: Tally::new(motion.frames.len()),
+        tally: Tally {
+            frames: motion.frames.len(),
+            ..Tally::default()
+        },
         recording: object.as_ref().map(|_| TrackRecording::new(&motion.track)),
         output,
     };
@@ -149,22 +151,19 @@ impl Arguments {
         if let Some(budget) = self.budget {
             track.search_mut().budget = Some(wire_duration(budget));
         }
-        track.prediction_horizon = self
-            .prediction_horizon
-            .map(wire_duration)
-            .or(track.prediction_horizon);
+        let horizon = self.prediction_horizon.map(wire_duration);
+        track.prediction_horizon = horizon.or(track.prediction_horizon);
         Ok(motion)
     }
 
-    /// A built-in motion.
     fn built_in(&self, name: &str) -> Result<Motion, Failure> {
         let holdout = request_for(built_in(name)?).holdout.unwrap_or_default();
-        let mut track = Track::new(&holdout.object);
-        if let Some(hand) = self.receiving_hand {
-            track = track.receiving(hand);
-        }
+        let track = Track::new(&holdout.object);
         Ok(Motion {
-            track,
+            track: match self.receiving_hand {
+                Some(hand) => track.receiving(hand),
+                None => track,
+            },
             frames: motions::frames(self.moving, &holdout, self.rate, self.length),
         })
     }
@@ -172,7 +171,7 @@ impl Arguments {
 
 async fn read_motion(path: &Path) -> Result<Motion, Failure> {
     let path = path.to_owned();
-    crate::blocking(move || {
+    blocking(move || {
         let wrong = |place: &str, error: &JsonError| {
             Failure::usage(format!("motion {}: {place}: {error}", path.display()))
         };
@@ -186,7 +185,6 @@ async fn read_motion(path: &Path) -> Result<Motion, Failure> {
     .await
 }
 
-/// Frames per second.
 fn parse_rate(text: &str) -> Result<f32, String> {
     match text.parse() {
         Ok(rate) if (1.0..=1000.0).contains(&rate) => Ok(rate),
@@ -197,7 +195,6 @@ fn parse_rate(text: &str) -> Result<f32, String> {
 /// What has been sent and answered.
 struct Played {
     tally: Tally,
-    /// To be drawn.
     recording: Option<TrackRecording>,
     output: Output,
 }
@@ -233,7 +230,7 @@ impl Played {
                     }
                 }
             }
-            self.tally.sent(frame.sequence);
+            self.tally.sent.push_back((frame.sequence, Instant::now()));
             track.send(frame);
             if let Some(recording) = &mut self.recording {
                 recording.sent(frame);
@@ -262,7 +259,6 @@ impl Played {
     }
 }
 
-/// The statuses, in the order in which they are listed.
 const STATUSES: [(CurrentGraspStatus, &str); 5] = [
     (CurrentGraspStatus::Kept, "kept"),
     (CurrentGraspStatus::Adjusted, "adjusted"),
@@ -271,7 +267,6 @@ const STATUSES: [(CurrentGraspStatus, &str); 5] = [
     (CurrentGraspStatus::Aborted, "aborted"),
 ];
 
-/// Answers so far.
 #[derive(Debug, Default)]
 struct Tally {
     frames: usize,
@@ -306,20 +301,6 @@ fn percentiles(values: &[f64]) -> [f64; 2] {
 }
 
 impl Tally {
-    /// Of so many frames.
-    fn new(frames: usize) -> Self {
-        Self {
-            frames,
-            ..Self::default()
-        }
-    }
-
-    /// A frame is on its way.
-    fn sent(&mut self, sequence: u64) {
-        self.sent.push_back((sequence, Instant::now()));
-    }
-
-    /// An answer has come.
     fn answered(&mut self, answer: &TrackAnswer) {
         while let Some((sequence, sent)) = self.sent.pop_front_if(|(sent, _)| *sent <= answer.sequence) {
             if sequence == answer.sequence {
@@ -350,7 +331,6 @@ impl Tally {
         }
     }
 
-    /// True if any answer had a grasp.
     fn has_grasp(&self) -> bool {
         let [kept, adjusted, replanned, ..] = self.counts;
         kept + adjusted + replanned > 0
@@ -361,14 +341,12 @@ impl Tally {
         STATUSES.into_iter().map(|(_, name)| name).zip(self.counts)
     }
 
-    /// The live line.
     fn line(&self) -> String {
         let counts = self.by_status().map(|(name, count)| format!("{name} {count}"));
         let latest = self.round_trips.last().copied().unwrap_or_default();
         format!("{}  {:.1} ms", joined("  ", counts), latest * 1e3)
     }
 
-    /// The result, for scripts.
     fn to_json(&self) -> Value {
         let both = |values: &[f64]| {
             let [median, p99] = percentiles(values);
@@ -393,7 +371,6 @@ impl Tally {
     }
 }
 
-/// The result, for people.
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let times = |seconds: &[f64]| {
@@ -401,10 +378,8 @@ impl fmt::Display for Tally {
             format!("{median:.2} ms, 99 %: {p99:.2} ms")
         };
         let (frames, answered, overtaken) = (self.frames, self.answered, self.skipped);
-        let mut lines = vec![(
-            "frames",
-            format!("{frames}, {answered} answered, {overtaken} overtaken"),
-        )];
+        let counts = format!("{frames}, {answered} answered, {overtaken} overtaken");
+        let mut lines = vec![("frames", counts)];
         let is_shown = |(name, count): &(&str, usize)| *name != "aborted" || *count > 0;
         let counts = self.by_status().filter(is_shown);
         lines.extend(counts.map(|(name, count)| (name, count.to_string())));
@@ -445,10 +420,11 @@ mod tests {
 
     #[test]
     fn counts_answers_by_status_and_frames_that_were_overtaken() {
-        let mut tally = Tally::new(4);
-        for sequence in 0..4 {
-            tally.sent(sequence);
-        }
+        let mut tally = Tally {
+            frames: 4,
+            sent: (0..4).map(|sequence| (sequence, Instant::now())).collect(),
+            ..Tally::default()
+        };
         tally.answered(&answer(0, CurrentGraspStatus::Replanned));
         tally.answered(&answer(3, CurrentGraspStatus::Kept));
         assert_eq!(tally.last_answered, Some(3));
@@ -456,8 +432,8 @@ mod tests {
         assert!(line.starts_with("kept 1  adjusted 0  re-planned 1  none 0"));
         let json = tally.to_json();
         assert_eq!(
-            (&json["answered"], &json["skipped"], &json["replanned"]),
-            (&2.into(), &2.into(), &1.into())
+            [&json["answered"], &json["skipped"], &json["replanned"]],
+            [2, 2, 1]
         );
         assert!(tally.has_grasp());
         assert!(tally.to_string().contains("4, 2 answered, 2 overtaken"));

@@ -84,13 +84,11 @@ fn moved(moving: Moving, holdout: &Holdout, time: f32) -> Holdout {
     moved
 }
 
-/// Moves giver and object together.
 fn together(holdout: &mut Holdout, by: Pose) {
     holdout.client_from_object = Some(by * holdout.client_from_object());
     hand(holdout, by);
 }
 
-/// Moves the giver's hand alone.
 fn hand(holdout: &mut Holdout, by: Pose) {
     match form(holdout) {
         Some(Form::Pose(hand)) => {
@@ -105,7 +103,6 @@ fn hand(holdout: &mut Holdout, by: Pose) {
     }
 }
 
-/// The giver's hand.
 fn form(holdout: &mut Holdout) -> Option<&mut Form> {
     holdout.presenting_hand.as_mut()?.form.as_mut()
 }

@@ -2,12 +2,13 @@
 
 use std::{io::Write as _, time::Duration};
 
+use grasp_client::v1;
 use serde_json::json;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
 use crate::{
-    harness::{Ended, assert_contains, assert_has, grasp},
+    harness::{Ended, assert_contains, assert_has, grasp, real_server},
     scripted::{Act, Scripted},
 };
 
@@ -17,18 +18,11 @@ fn closed_port() -> String {
     format!("http://{}", listener.local_addr().unwrap())
 }
 
-/// The URL of a server that answers so many calls.
-async fn answering(calls: usize) -> String {
-    let script = (0..calls).map(|_| Act::Answer);
-    Scripted::new(script).serve().await
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn lists_objects_as_table_and_as_json() {
-    // Three pages, of an object each, and the atlas of each object for the table.
-    let list = grasp("objects list").at(&answering(9).await);
-    assert_contains(&list.text(), &["objects/b", "objects/c"]);
-    assert_eq!(list.json()["objects"][2]["name"], "objects/c");
+    let list = grasp("objects list").at(&real_server().await);
+    assert_contains(&list.text(), &["objects/remote", "objects/scissors"]);
+    assert_eq!(list.json()["objects"][0]["name"], "objects/remote");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -68,23 +62,36 @@ async fn servers_that_are_unreachable_or_unavailable_exit_with_5() {
     health.complains(5, "error: cannot connect to http://127.0.0.1:");
     let scripts = health.with("--json").ends_with(5);
     assert_eq!(scripts.error()["kind"], "connect");
-    let service = Scripted::new((0..2).map(|_| Act::Fail(Status::unavailable("draining"))));
+    let service = Scripted::new([Act::unavailable(), Act::unavailable()]);
     let get = grasp("objects get remote --tries 2").at(&service.serve().await);
     assert_eq!(get.ends_with(5).stderr, "error: draining (tried 2 times)\n");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn health_exits_with_0_when_serving() {
-    let health = grasp("health").at(&Scripted::default().serve().await);
+    let health = grasp("health").at(&real_server().await);
     assert_eq!(health.text(), "serving\n");
     assert_eq!(health.json()["health"], "serving");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn no_grasp_within_the_budget_exits_with_3() {
+    let limit = v1::Verdict {
+        description: "mass: 80 kg".to_owned(),
+        ..v1::Verdict::default()
+    };
+    let none = v1::FindGraspResponse {
+        outcome: v1::Outcome::BudgetExhausted.into(),
+        report: Some(v1::SearchReport {
+            limits: vec![limit],
+            ..v1::SearchReport::default()
+        }),
+        ..v1::FindGraspResponse::default()
+    };
+    let service = Scripted::new([0, 1].map(|_| Act::answer(std::slice::from_ref(&none))));
     let find = grasp("find --request - --budget 250ms")
         .input(r#"{"holdout": {"object": "objects/remote"}, "search": {"budget": "1s"}}"#)
-        .at(&answering(2).await);
+        .at(&service.serve().await);
     let people = find.ends_with(3).stdout;
     assert_contains(
         &people,
@@ -95,11 +102,12 @@ async fn no_grasp_within_the_budget_exits_with_3() {
         &answer,
         &json!({"outcome": "OUTCOME_BUDGET_EXHAUSTED", "grasps": null}),
     );
-    let limit = &answer["report"]["limits"][0];
-    assert_has(limit, &json!({"check": "CHECK_MASS", "bound": 70.0}));
-    // The option overrides the file.
-    let printed = find.with("--print-request").json();
-    assert_eq!(printed["search"]["budget"], "0.250s");
+    assert_eq!(answer["report"]["limits"][0]["description"], "mass: 80 kg");
+    // The option overrides the file, and the call may take as much longer.
+    let call = &service.calls()[0];
+    let budget = call.messages::<v1::FindGraspRequest>()[0].budget();
+    assert_eq!(budget, Some(Duration::from_millis(250)));
+    assert!(call.timeout.starts_with("102"), "{}", call.timeout);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -144,7 +152,7 @@ async fn completions_contain_the_commands() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn closed_pipe_ends_quietly() {
-    let list = grasp("objects list").at(&answering(6).await);
+    let list = grasp("objects list").at(&real_server().await);
     for call in [grasp("completions bash"), grasp("--help"), list] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
@@ -171,7 +179,7 @@ async fn interrupt_exits_with_130() {
     let service = Scripted::new([Act::Hang]);
     let get = grasp("objects get remote --timeout 5m").at(&service.serve().await);
     let child = get.command().spawn().unwrap();
-    while service.calls() == 0 {
+    while service.calls().is_empty() {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
     let ended = interrupt(child);

@@ -173,14 +173,12 @@ pub(crate) fn empty_folder(name: &str) -> PathBuf {
     folder
 }
 
-/// A new file in a folder.
 pub(crate) fn file(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
     let path = folder.join(name);
     fs::write(&path, content).unwrap();
     path
 }
 
-/// A file is a picture.
 #[track_caller]
 pub(crate) fn assert_png(path: impl AsRef<Path>) {
     assert!(fs::read(path).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));

@@ -33,15 +33,9 @@ fn stretched(handedness: Handedness, frame_from_wrist: Pose) -> v1::HandPose {
         Handedness::Left => v1::Handedness::Left,
         Handedness::Right => v1::Handedness::Right,
     };
-    let digits = rig.stretched().map(|digit| {
-        let third = digit.third_pitch;
-        Some(v1::DigitAngles::new([
-            digit.base_yaw,
-            digit.base_pitch,
-            digit.second_pitch,
-            third,
-        ]))
-    });
+    let digits = rig
+        .stretched()
+        .map(|digit| Some(v1::DigitAngles::new(digit.to_array())));
     let object_from_wrist = Pose::from_position(-CLIENT_FROM_OBJECT) * wrist;
     v1::HandPose {
         joints: joints
@@ -64,10 +58,8 @@ fn handover() -> Handover {
         phalanx: 3,
         ..v1::Contact::default()
     };
-    let giver = stretched(
-        Handedness::Left,
-        Pose::from_position(Vec3::new(0.05, -0.1, -0.03)),
-    );
+    let behind = Pose::from_position(Vec3::new(0.05, -0.1, -0.03));
+    let giver = stretched(Handedness::Left, behind);
     let receiver = stretched(Handedness::Right, Pose::new(Vec3::new(-0.05, 0.1, 0.03), turned));
     Handover {
         object: Part::object(&rod(), &[0, 5, 9, 100_000], Vec3::ONE, Finish::Satin),
@@ -103,10 +95,7 @@ fn names_parts_by_content() {
          contact_index_third force_index_third contact_index_third_2 contact_palm force_palm";
     assert_eq!(names.join(" "), expected);
     let extras = part(&parts, "force_thumb_third").extras.as_ref().unwrap();
-    assert_eq!(
-        (&extras["digit"], &extras["phalanx"]),
-        (&json!("thumb"), &json!("third"))
-    );
+    assert_eq!([&extras["digit"], &extras["phalanx"]], ["thumb", "third"]);
     let newtons = extras["force_n"].as_f64().unwrap();
     assert!((newtons - 17.0_f64.sqrt()).abs() < 1e-6);
     // The arrow ends at the contact.
@@ -202,11 +191,8 @@ fn a_known_arm_has_sleeves_from_wrist_to_shoulder_that_cover_the_skin() {
 
 #[test]
 fn picture_shows_hands_object_and_contacts() {
-    let size = ViewSize {
-        width: 150,
-        height: 120,
-    };
-    let image = handover().draw(size).unwrap();
+    let (width, height) = (150, 120);
+    let image = handover().draw(ViewSize { width, height }).unwrap();
     assert_eq!((image.width, image.height), (150, 120));
     let count = |is_wanted: fn([i32; 3]) -> bool| {
         let pixels = image.rgb.chunks(3);

@@ -162,11 +162,19 @@ fn nearest_to(receiver: &mut Receiver, place: Vec3) -> f32 {
 }
 
 #[test]
-fn withdraws_over_the_pose_of_an_aborted_grasp_to_where_it_waited() {
+fn goes_by_planned_key_frames_and_withdraws_over_the_pose_of_an_aborted_grasp() {
     let mut receiver = waiting();
     let start = wrist(&receiver);
     assert!(receiver.is_waiting());
-    receiver.take(&at(0.0), false);
+    let mut planned = at(0.0);
+    let before = Vec3::new(0.2, 0.1, 0.09);
+    planned.key_frames = vec![v1::KeyFrame {
+        kind: v1::KeyFrameKind::Approach.into(),
+        hand: Some(hand(before, Quat::IDENTITY, 0.0)),
+    }];
+    receiver.take(&planned, false);
+    let nearest = nearest_to(&mut receiver, before);
+    assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
     assert!(!receiver.is_waiting());
     rest(&mut receiver, 2.0);
     let aside = Vec3::new(0.05, 0.1, 0.12);
@@ -176,25 +184,6 @@ fn withdraws_over_the_pose_of_an_aborted_grasp_to_where_it_waited() {
     assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
     assert!(receiver.is_waiting());
     assert!(wrist(&receiver).position.distance(start.position) < 1e-4);
-}
-
-#[test]
-fn goes_by_planned_key_frames() {
-    let key_frame = |kind: v1::KeyFrameKind, position: Vec3| v1::KeyFrame {
-        kind: kind.into(),
-        hand: Some(hand(position, Quat::IDENTITY, 0.0)),
-    };
-    let mut planned = at(0.0);
-    let aside = Vec3::new(0.2, 0.1, 0.09);
-    planned.key_frames = vec![
-        key_frame(v1::KeyFrameKind::Approach, aside),
-        key_frame(v1::KeyFrameKind::PreGrasp, Vec3::new(0.02, 0.03, 0.09)),
-        key_frame(v1::KeyFrameKind::Close, Vec3::new(0.0, 0.02, 0.09)),
-    ];
-    let mut receiver = waiting();
-    receiver.take(&planned, false);
-    let nearest = nearest_to(&mut receiver, aside);
-    assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
 }
 
 #[test]

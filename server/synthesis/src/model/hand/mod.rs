@@ -152,7 +152,7 @@ impl DigitAngles {
     }
 
     /// Yaw and pitches from the base outward.
-    pub(crate) fn to_array(self) -> [f32; 4] {
+    pub fn to_array(self) -> [f32; 4] {
         [
             self.base_yaw,
             self.base_pitch,
