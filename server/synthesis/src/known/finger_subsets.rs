@@ -172,28 +172,6 @@ pub(super) fn upper_bounds(
 mod tests {
     use super::*;
 
-    /// A hand that closes with three fingers, or with index and little finger.
-    fn closes(digits: [bool; 5]) -> bool {
-        let fingers = digits[1..].iter().filter(|finger| **finger).count();
-        fingers >= 3 || (digits[1] && digits[4])
-    }
-
-    #[test]
-    fn contains_subsets_of_holding_fingers_that_close() {
-        let all = FingerSubsets::of([true; 5], closes);
-        for set in 0..16 {
-            assert_eq!(all.contains(digits(set)), closes(digits(set)), "{set:04b}");
-        }
-        let without_ring = [true, true, true, false, true];
-        let sets = FingerSubsets::of(without_ring, closes);
-        assert!(sets.contains(without_ring) && sets.contains(digits(0b1001)));
-        assert!(!sets.contains(digits(0b0111)), "the ring finger does not hold");
-        assert!(
-            !sets.contains([false, true, true, false, true]),
-            "the thumb is never left out"
-        );
-    }
-
     #[test]
     fn farthest_matches_exhaustive_search() {
         let mut numbers = (1..).map(|number: u32| number.wrapping_mul(2_654_435_761) >> 24);
@@ -224,23 +202,5 @@ mod tests {
             assert!(sets.contains(kept), "case {case}");
             assert_eq!((nearest(number(kept)), distance), (best, best), "case {case}");
         }
-    }
-
-    #[test]
-    fn bits_round_trip_and_invalid_bits_are_rejected() {
-        let holding = [true, true, false, true, true];
-        let sets = FingerSubsets::of(holding, closes);
-        assert_eq!(FingerSubsets::from_bits(sets.to_bits(), holding), Some(sets));
-        assert_eq!(
-            FingerSubsets::from_bits(sets.to_bits(), [true; 5]),
-            None,
-            "not all"
-        );
-        assert_eq!(
-            FingerSubsets::from_bits(sets.to_bits() | 1 << 0b0010, holding),
-            None,
-            "the middle finger"
-        );
-        assert_eq!(FingerSubsets::from_bits(0, holding), None);
     }
 }

@@ -265,39 +265,3 @@ impl Grid {
         ((point - self.low) / self.edge).floor().as_ivec3()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn cell(x: i32) -> Cell {
-        Cell(IVec3::new(x, 0, 0), [0, 2], false)
-    }
-
-    #[test]
-    fn full_cell_replaces_only_its_worst_grip() {
-        let mut spread = Spread::default();
-        let scores = [0.5, 0.2, 0.7].into_iter().chain(std::iter::repeat(0.9));
-        for (index, base_score) in scores.take(MAX_PER_CELL).enumerate() {
-            assert_eq!(spread.admission(cell(0), base_score), Admission::Add);
-            spread.record(cell(0), index, base_score);
-        }
-        assert_eq!(spread.admission(cell(0), 0.1), Admission::Reject);
-        assert_eq!(
-            spread.admission(cell(0), 0.2),
-            Admission::Reject,
-            "as good is not better"
-        );
-        assert_eq!(spread.admission(cell(0), 0.3), Admission::Replace(1));
-        assert_eq!(
-            spread.admission(cell(1), 0.1),
-            Admission::Add,
-            "the next cell is empty"
-        );
-        spread.record(cell(0), 1, 0.6);
-        assert_eq!(spread.admission(cell(0), 0.55), Admission::Replace(0));
-        // A required grip is recorded beyond the limit, and may be replaced later.
-        spread.record(cell(0), MAX_PER_CELL, 0.05);
-        assert_eq!(spread.admission(cell(0), 0.1), Admission::Replace(MAX_PER_CELL));
-    }
-}

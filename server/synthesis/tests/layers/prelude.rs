@@ -1,26 +1,13 @@
 //! What nearly every test uses.
 
 pub(crate) use crate::fixtures::{
-    atlases::{
-        complete_atlas, every, grown, grown_to, growth, learned, scissors_held_by, shipped_atlas,
-        tight_givers, valid_grips,
-    },
-    hands::{
-        adult, adult_with, all_hands, angles, arm, built_in_hand, hand_pose, pair_distance, pose_between,
-        right, sampled_distance, simple_rig, thumb_side, tracked,
-    },
+    atlases::*,
+    hands::*,
     meshes::{self, Parts, cuboid, cylinder_mesh, moved, open_box, sheet, sphere, torus},
-    objects::{
-        OBJECT_NAMES, UP, bar, bar_mesh, box_at, changed, data_folder, floating, giver_solids, half_space,
-        held, held_by, lunch_box, name_of, object, object_of, oriented_box, plate, prepared, real_objects,
-        resized, rod, tracked_holdouts, triangles_where, upright_bar_with_forbidden_ends,
-    },
+    objects::*,
     oracle::{self, distance_to_mesh, winding_number},
     random::{Random, contact, contacts_at, score, touches},
-    searches::{
-        FakeClock, NO_GIVER, Search, guided, holds, object_scene, place, pool, surroundings, thesis, verdict,
-        within_reach, without_thumb,
-    },
+    searches::*,
 };
 pub(crate) use glam::{DVec3, Quat, Vec3};
 pub(crate) use grasp_assets::holdouts::holdouts;
@@ -69,7 +56,6 @@ pub(crate) use grasp_synthesis::{
         grip::{GIVER_CLEARANCE, Gripper, MAX_PENETRATION},
         immobility::{BALANCE_TOLERANCE, Buffers, EPSILON_TOLERANCE, Load, SoftContact, TorqueScale},
         presented::{ObjectScene, Presented},
-        shape::Proposal,
         solids::{
             HandSolids, PreparedHand, SOFT_CONTACT, Spheres, TaperedCapsule, TrackedSolids, clearance,
             self_clearance,

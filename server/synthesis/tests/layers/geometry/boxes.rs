@@ -3,7 +3,6 @@
 use crate::prelude::*;
 use grasp_synthesis::geometry::boxes::{Aabb, SolidBox};
 
-/// Checks the box of any mesh.
 fn check(name: &str, mesh: &TriangleMesh) -> OrientedBox {
     let fitted = OrientedBox::around(mesh);
     let aabb = mesh.aabb();
@@ -35,12 +34,12 @@ fn sorted(extents: Vec3) -> [f32; 3] {
 
 #[test]
 fn boxes_fit_their_meshes_tightly() {
-    for (name, mesh) in meshes::all() {
-        check(name, &mesh);
-    }
-    for (name, mesh) in real_objects() {
+    for (name, mesh) in meshes::all_and_real() {
         check(&name, &mesh);
     }
+    let tilt = Random::new(10).rotation();
+    let flat = moved(&sheet(0.1, 0.0, 2), tilt, Vec3::ZERO);
+    assert!(check("a tilted sheet", &flat).half_extents.min_element() < 1e-6);
 }
 
 #[test]
@@ -67,24 +66,6 @@ fn turned_boxes_are_recovered() {
 }
 
 #[test]
-fn a_flat_mesh_gets_a_flat_box() {
-    let mut random = Random::new(10);
-    let rotation = random.rotation();
-    let corners = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.0, 0.1)];
-    let mesh = TriangleMesh::new(
-        corners.map(|(x, y)| rotation * Vec3::new(x, y, 0.0)).to_vec(),
-        vec![[0, 1, 2], [0, 2, 3]],
-    )
-    .expect("it is sound");
-    let [thickness, width, length] = sorted(check("rectangle", &mesh).half_extents);
-    assert!(thickness < 1e-6, "{thickness}");
-    assert!(
-        (width - 0.05).abs() < 5e-4 && (length - 0.1).abs() < 1e-3,
-        "{width} {length}"
-    );
-}
-
-#[test]
 fn distances_to_the_box_match_its_surface() {
     let rotation = Quat::from_axis_angle(Vec3::new(0.0, 0.6, 0.8), 1.1);
     let half = Vec3::new(0.05, 0.03, 0.02);
@@ -101,6 +82,11 @@ fn distances_to_the_box_match_its_surface() {
         );
         assert_eq!(signed <= 0.0, fitted.contains(point), "{point}: {signed}");
         assert_eq!(fitted.distance(point), signed.max(0.0), "{point}");
+        let solid = SolidBox::new(&fitted);
+        assert!((solid.signed_distance(point) - signed).abs() < ROUNDING);
+        // Along its gradient, the distance grows as fast as the point moves; from inside, up to the face.
+        let grown = fitted.signed_distance(point + solid.outward(point) * 1e-4) - signed;
+        assert!((grown - 1e-4).abs() < ROUNDING, "{grown} at {point}");
     }
 }
 
@@ -134,9 +120,8 @@ fn capsule_distances_are_least_over_the_balls_along_the_axis() {
         let of = any_box(&mut random);
         let capsule = any_capsule(&mut random, &of);
         let distance = SolidBox::new(&of).distance(&capsule);
-        let least = (0..=BALLS)
-            .map(|i| f32::from(i) / f32::from(BALLS))
-            .map(|t| of.signed_distance(capsule.at(t)) - capsule.radius_at(t))
+        let least = balls(&capsule, BALLS)
+            .map(|(at, radius)| of.signed_distance(at) - radius)
             .fold(f32::INFINITY, f32::min);
         let change = capsule.length() + (capsule.end_radius - capsule.start_radius).abs();
         let slack = 0.5 * change / f32::from(BALLS) + ROUNDING;
@@ -170,21 +155,6 @@ fn a_wide_floor_is_as_exact_as_a_small_box() {
     }
 }
 
-#[test]
-fn point_distances_are_those_of_the_oriented_box() {
-    let mut random = Random::new(54);
-    for _ in 0..2000 {
-        let of = any_box(&mut random);
-        let point = of.object_from_box.position + random.in_cube() * 0.1;
-        let distance = SolidBox::new(&of).signed_distance(point);
-        assert!((distance - of.signed_distance(point)).abs() < ROUNDING);
-        // Along its gradient, the distance grows as fast as the point moves; from inside, up to the face.
-        let out = SolidBox::new(&of).outward(point);
-        let grown = of.signed_distance(point + out * 1e-4) - distance;
-        assert!((grown - 1e-4).abs() < ROUNDING, "{grown} at {point} of {of:?}");
-    }
-}
-
 /// Points along each side of a triangle.
 const SAMPLES: usize = 60;
 
@@ -196,68 +166,29 @@ fn vector(stream: &mut AttemptStream) -> Vec3 {
     stream.in_cube()
 }
 
-/// Zones of every kind.
-fn zones(stream: &mut AttemptStream) -> [Zone; 5] {
-    let turn = Pose::from_orientation(glam::Quat::from_scaled_axis(vector(stream) * 3.0));
-    let mut radius = || stream.between(0.2, 1.2);
-    let [ball, tube, x, y, z] = [(); 5].map(|()| radius());
-    let radii = [(); 3].map(|()| radius());
-    let points = [(); 3].map(|()| vector(stream));
+/// A random zone of every kind, with its boundary this much farther out.
+fn zones(attempt: u64, by: f32) -> [Zone; 5] {
+    let mut stream = AttemptStream::new(5, attempt);
+    let mut length = || stream.between(0.2, 1.2) + by;
+    let radii = [(); 5].map(|()| length());
+    let half_extents = Vec3::from_array([(); 3].map(|()| length()));
+    let points = [(); 4].map(|()| vector(&mut stream));
+    let turn = Quat::from_scaled_axis(vector(&mut stream) * 3.0);
+    let normal = vector(&mut stream).normalize_or(Vec3::X);
+    let part = |k: usize| TaperedCapsule::new(points[k], points[k + 1], radii[k], radii[k + 1]);
     [
         Zone::Ball {
-            centre: vector(stream),
-            radius: ball,
+            centre: points[0],
+            radius: radii[3],
         },
-        Zone::Box(oriented_box(
-            Pose::from_position(vector(stream)) * turn,
-            Vec3::new(x, y, z),
-        )),
-        Zone::HalfSpace {
-            point: vector(stream),
-            normal: vector(stream).normalize_or(Vec3::X),
-        },
+        Zone::Box(oriented_box(Pose::new(points[1], turn), half_extents)),
+        half_space(points[2] - normal * by, normal),
         Zone::Tube {
-            points: (0..4).map(|_| vector(stream)).collect(),
-            radius: tube,
+            points: points.to_vec(),
+            radius: radii[4],
         },
-        Zone::TaperedTube(
-            (0..2)
-                .map(|k| TaperedCapsule::new(points[k], points[k + 1], radii[k], radii[k + 1]))
-                .collect(),
-        ),
+        Zone::TaperedTube(vec![part(0), part(1)]),
     ]
-}
-
-/// The same zone with a boundary farther out.
-fn inflated(zone: &Zone, by: f32) -> Zone {
-    match zone.clone() {
-        Zone::Ball { centre, radius } => Zone::Ball {
-            centre,
-            radius: radius + by,
-        },
-        Zone::Box(of) => Zone::Box(OrientedBox {
-            half_extents: of.half_extents + Vec3::splat(by),
-            ..of
-        }),
-        Zone::HalfSpace { point, normal } => Zone::HalfSpace {
-            point: point - normal * by,
-            normal,
-        },
-        Zone::Tube { points, radius } => Zone::Tube {
-            points,
-            radius: radius + by,
-        },
-        Zone::TaperedTube(parts) => Zone::TaperedTube(
-            parts
-                .into_iter()
-                .map(|part| TaperedCapsule {
-                    start_radius: part.start_radius + by,
-                    end_radius: part.end_radius + by,
-                    ..part
-                })
-                .collect(),
-        ),
-    }
 }
 
 fn samples([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
@@ -270,38 +201,26 @@ fn samples([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
 }
 
 #[test]
-fn a_triangle_meets_a_zone_where_one_of_its_points_is_in_it() {
+fn a_triangle_meets_a_zone_where_one_of_its_points_is_in_it_at_any_scale() {
     let mut met = [0; 5];
     for attempt in 0..500 {
-        let mut stream = AttemptStream::new(5, attempt);
+        let mut stream = AttemptStream::new(6, attempt);
         let middle = vector(&mut stream);
         let corners = [(); 3].map(|()| middle + vector(&mut stream) * 0.25 * SIDE);
-        for (kind, zone) in zones(&mut stream).iter().enumerate() {
+        let (scale, point) = (stream.between(0.3, 3.0), vector(&mut stream));
+        let [wider, narrower] = [SPACING, -1e-5].map(|by| zones(attempt, by));
+        for (kind, zone) in zones(attempt, 0.0).iter().enumerate() {
             let meets = zone.meets(corners);
             met[kind] += usize::from(meets);
-            let any_in = |zone: &Zone| samples(corners).any(|point| zone.contains(point));
-            if meets {
-                assert!(any_in(&inflated(zone, SPACING)), "{zone:?} {corners:?}");
-            } else {
-                assert!(!any_in(&inflated(zone, -1e-5)), "{zone:?} {corners:?}");
+            let other = if meets { &wider[kind] } else { &narrower[kind] };
+            let any_in = samples(corners).any(|point| other.contains(point));
+            assert_eq!(any_in, meets, "{zone:?} {corners:?}");
+            // Not at the boundary, where rounding decides.
+            if wider[kind].contains(point) == narrower[kind].contains(point) {
+                assert_eq!(zone.scaled(scale).contains(point * scale), zone.contains(point));
             }
         }
     }
     // Both cases occur for every kind.
     assert!(met.iter().all(|count| (50..450).contains(count)), "{met:?}");
-}
-
-#[test]
-fn a_scaled_zone_contains_the_scaled_points() {
-    for attempt in 0..200 {
-        let mut stream = AttemptStream::new(6, attempt);
-        let scale = stream.between(0.3, 3.0);
-        for zone in zones(&mut stream) {
-            let point = vector(&mut stream);
-            // Not at the boundary, where rounding decides.
-            if inflated(&zone, 1e-4).contains(point) == inflated(&zone, -1e-4).contains(point) {
-                assert_eq!(zone.scaled(scale).contains(point * scale), zone.contains(point));
-            }
-        }
-    }
 }

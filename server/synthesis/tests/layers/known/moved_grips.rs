@@ -1,35 +1,22 @@
 //! Grips that are mirrored, resized or rounded.
 
 use grasp_synthesis::{
-    known::{moved_grips::on_resized, seeds::ResizedGrips},
-    physical::grip::PosedDigits,
-    propose::both_hands::Mirror,
+    known::moved_grips::on_resized, physical::grip::PosedDigits, propose::both_hands::Mirror,
 };
 
 use crate::prelude::*;
 
-/// A bar with a thinner one at its end: symmetric about two planes, but not about the third.
-fn club() -> Arc<GraspObject> {
-    let mesh = Parts::default()
-        .cuboid(Vec3::ZERO, Vec3::new(0.02, 0.06, 0.015), 6)
-        .cuboid(Vec3::Y * 0.1, Vec3::new(0.012, 0.05, 0.01), 6)
-        .mesh();
-    Arc::new(object_of(mesh, &[]))
-}
-
-/// The grips of a growth with the right hand, and their mirror images.
-fn both(object: &Arc<GraspObject>) -> (Grown, Grown, Mirror) {
-    let mirror = Mirror::of_symmetric(prepared(object)).expect("it is symmetric");
-    let of_right = grown_to(object, right(), 150).kept();
-    let of_left = of_right.clone().mirrored(mirror, object, adult(Handedness::Left));
-    (of_right, of_left, mirror)
-}
-
 #[test]
 fn mirror_images_of_grips_hold_a_symmetric_object() {
-    let object = club();
+    // A bar with a thinner one at its end: symmetric about two planes, but not about the third.
+    let club = Parts::default()
+        .cuboid(Vec3::ZERO, Vec3::new(0.02, 0.06, 0.015), 6)
+        .cuboid(Vec3::Y * 0.1, Vec3::new(0.012, 0.05, 0.01), 6);
+    let object = Arc::new(object_of(club.mesh(), &[]));
     let left = adult(Handedness::Left);
-    let (of_right, of_left, mirror) = both(&object);
+    let mirror = Mirror::of_symmetric(prepared(&object)).expect("it is symmetric");
+    let of_right = grown_to(&object, right(), 150).kept();
+    let of_left = of_right.clone().mirrored(mirror, &object, left);
     let scene = object_scene(&object);
     let mut gripper = Gripper::default();
     let mut holds = |rig, entry: &Entry| {
@@ -59,33 +46,6 @@ fn mirror_images_of_grips_hold_a_symmetric_object() {
     assert!(images.next().is_none());
     // Those that touch sharp edges, of which a cuboid has many.
     assert!(held > 100 && 8 * missing <= held, "{held} {missing}");
-}
-
-#[test]
-fn mirrored_holdouts_have_answers_of_like_score() {
-    let object = club();
-    let (of_right, of_left, mirror) = both(&object);
-    for up in [
-        Vec3::Y,
-        Vec3::X,
-        Vec3::Z,
-        Vec3::new(0.6, 0.0, 0.8),
-        Vec3::new(-0.48, -0.6, 0.64),
-    ] {
-        let found = [
-            (Handedness::Right, &of_right, up),
-            (Handedness::Left, &of_left, mirror.direction(up)),
-        ]
-        .map(|(hand, grown, up)| {
-            let holdout = Holdout::new(Arc::clone(&object), None, up).expect("up is a unit vector");
-            let search = guided(&holdout).rig(adult(hand)).atlas(&grown.atlas);
-            let outcome = search.run();
-            assert!(outcome.grasp.is_some());
-            outcome.value
-        });
-        // All edges of this one are sharp.
-        assert!((found[0] - found[1]).abs() < 0.03, "{up}: {found:?}");
-    }
 }
 
 #[test]
@@ -150,42 +110,10 @@ fn contacts_stay_on_the_surface_and_hands_where_they_hold_it() {
     }
 }
 
-/// How many of some seeds find a grasp within so many attempts.
-fn found(scale: f32, seeds: &SeedSource, attempts: u64) -> usize {
-    let holdout = floating(resized(object("scissors"), scale));
-    let finds = |seed: &u64| {
-        guided(&holdout)
-            .seed(*seed)
-            .seeds(seeds.clone())
-            .max_attempts(attempts)
-            .grasp()
-            .is_some()
-    };
-    (0..40).filter(finds).count()
-}
-
-#[test]
-fn searches_from_grips_of_another_size_succeed_more_often() {
-    let atlas: Arc<Atlas> = complete_atlas("scissors");
-    let (mut with, mut without) = (0, 0);
-    for scale in SCALES {
-        let resized = SeedSource::Resized(ResizedGrips {
-            atlas: Arc::clone(&atlas),
-            scale,
-        });
-        let counts = [&resized, &SeedSource::Nothing].map(|seeds| found(scale, seeds, 4));
-        println!("{scale}: {counts:?} of 40 with and without known grips");
-        with += counts[0];
-        without += counts[1];
-    }
-    assert!(with > without, "{with} with known grips, {without} without");
-}
-
-/// Half the edges of the bar, in metres.
 const HALF: Vec3 = Vec3::new(0.015, 0.08, 0.015);
 
 #[test]
-fn a_hand_follows_the_surface_with_the_same_digits() {
+fn a_hand_follows_the_surface() {
     let own = Arc::new(bar());
     let grown = grown_to(&own, right(), 60).kept();
     let scene = object_scene(&own);
@@ -193,18 +121,16 @@ fn a_hand_follows_the_surface_with_the_same_digits() {
     for scale in [0.8, 1.05, 1.2, 1.5] {
         let other = resized(&own, scale);
         let on_other = object_scene(&other);
-        let (mut all, mut held, mut alike) = (0, 0, 0);
+        let (mut all, mut held) = (0, 0);
         for entry in grown.atlas.entries().iter().step_by(3) {
             let pose = &entry.grip.pose;
             let hand = on_resized([&scene, &on_other], scale, right(), pose);
             all += 1;
-            let Ok((grip, _)) =
-                gripper.hold_posed(&on_other, right(), &hand, &NO_GIVER, PosedDigits::Settled)
-            else {
+            let grip = gripper.hold_posed(&on_other, right(), &hand, &NO_GIVER, PosedDigits::Settled);
+            if grip.is_err() {
                 continue;
-            };
+            }
             held += 1;
-            alike += usize::from(grip.holding_digits() == entry.grip.holding_digits());
             for contact in &gripper.contacts {
                 let beyond = contact.position.abs() - scale * HALF;
                 assert!(beyond.max_element().abs() < 1e-4, "{scale}: {beyond}");
@@ -217,7 +143,6 @@ fn a_hand_follows_the_surface_with_the_same_digits() {
                 .distance(pose.frame_from_wrist.position);
             assert!(shift < grown_by + 0.02, "{scale}: {shift} m");
         }
-        println!("{scale}: {held} of {all} hold, {alike} with the same digits");
         assert!(10 * held >= 9 * all, "{scale}: {held} of {all}");
     }
 }

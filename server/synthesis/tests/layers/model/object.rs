@@ -5,9 +5,7 @@ use grasp_synthesis::geometry::mesh::MeshError;
 use grasp_synthesis::model::hand::joints::Skin;
 use grasp_synthesis::model::holdout::PresentingHandError;
 use grasp_synthesis::model::plain_object::{MAX_NAMED_TRIANGLES, ObjectError};
-use grasp_synthesis::model::score::{RegionTerm, RegionValue, Score};
 
-/// Compares with sampled points of the forbidden triangles.
 #[test]
 fn is_forbidden_within_matches_the_forbidden_triangles() {
     const STEPS: u16 = 12;
@@ -48,12 +46,10 @@ fn is_forbidden_within_matches_the_forbidden_triangles() {
     }
 }
 
-fn contact(triangle: u32, x: f32) -> Contact {
+fn on(triangle: u32, x: f32) -> Contact {
     Contact {
-        position: Vec3::X * x,
-        normal: Vec3::Y,
         triangle,
-        part: HandPart::Palm,
+        ..contact(Vec3::X * x, Vec3::Y, HandPart::Palm)
     }
 }
 
@@ -80,7 +76,7 @@ fn contacts_earn_the_weight_of_what_they_are_on() {
         10,
     );
     // On 0.8, on 0.4 by its triangle, on 0.4 by its place, on that and on what is to be avoided.
-    let contacts = [contact(1, 0.0), contact(2, 0.0), contact(3, 6.0), contact(4, 8.0)];
+    let contacts = [on(1, 0.0), on(2, 0.0), on(3, 6.0), on(4, 8.0)];
     let [preferred, avoided] = regions
         .values(&contacts)
         .map(|value| value.expect("there are regions"));
@@ -94,58 +90,19 @@ fn contacts_earn_the_weight_of_what_they_are_on() {
 }
 
 #[test]
-fn regions_scale_with_their_object() {
-    let regions = Regions::new(&[region(Wish::Avoid, 1.0, &[3], Some(2.0))], 4);
-    let doubled = regions.scaled(2.0);
-    for (triangle, x) in [(0, 1.0), (0, 3.0), (3, 1.0)] {
-        assert_eq!(
-            doubled.wish_at(triangle, Vec3::X * x * 2.0),
-            regions.wish_at(triangle, Vec3::X * x)
-        );
-    }
-}
-
-#[test]
-fn an_object_without_regions_has_no_terms_for_them() {
-    let regions = Regions::new(&[], 4);
-    assert!(regions.is_empty());
-    assert_eq!(regions.values(&[contact(0, 0.0)]), [None; 2]);
-    assert_eq!(regions.wish_at(0, Vec3::ZERO), 1.0);
+fn regions_scale_with_their_object_and_none_wish_nothing() {
     // Triangles that do not exist mark nothing.
-    assert_eq!(
-        Regions::new(&[region(Wish::Prefer, 1.0, &[9], None)], 4).wish_at(9, Vec3::ZERO),
-        0.0
-    );
-}
-
-#[test]
-fn the_total_is_the_weighted_mean_of_the_terms() {
-    let values = std::array::from_fn(|term| term as f32 / 20.0);
-    let plain = Score {
-        values,
-        regions: [None; 2],
-    };
-    let earned = RegionValue {
-        value: 0.25,
-        importance: 0.5,
-    };
-    let rated = Score {
-        regions: [None, Some(earned)],
-        ..plain
-    };
-    for score in [plain, rated] {
-        let weights: f32 = score.terms().map(|term| term.weight).sum();
-        let mean = score.terms().map(|term| term.weight * term.value).sum::<f32>() / weights;
-        assert!((score.total() - mean).abs() < 1e-6);
+    let regions = Regions::new(&[region(Wish::Avoid, 1.0, &[3, 9], Some(2.0))], 4);
+    let doubled = regions.scaled(2.0);
+    for (triangle, x, wish) in [(0, 1.0, 1.0), (0, 3.0, 0.0), (3, 1.0, 0.0), (9, 1.0, 1.0)] {
+        assert_eq!(regions.wish_at(triangle, Vec3::X * x), wish);
+        assert_eq!(doubled.wish_at(triangle, Vec3::X * x * 2.0), wish);
     }
-    assert_eq!(plain.terms().count(), 20);
-    assert_eq!(
-        rated.terms().last().map(|term| term.name),
-        Some(RegionTerm::OffAvoided.name())
-    );
+    let none = Regions::new(&[], 4);
+    assert!(none.is_empty() && none.values(&[on(0, 0.0)]) == [None; 2]);
+    assert_eq!(none.wish_at(0, Vec3::ZERO), 1.0);
 }
 
-/// Joints in a row along x.
 fn joints() -> HandJoints {
     HandJoints {
         handedness: Handedness::Right,
@@ -156,7 +113,6 @@ fn joints() -> HandJoints {
     }
 }
 
-/// A sphere that follows the wrist.
 fn skin() -> Skin {
     let sphere = sphere(0.04, 8);
     let count = sphere.positions().len();

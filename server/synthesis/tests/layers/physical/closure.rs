@@ -69,17 +69,6 @@ fn grasps_without_closure_have_epsilon_zero() {
     }
 }
 
-/// A contact without friction.
-fn frictionless(position: Vec3, normal: Vec3) -> SoftContact {
-    SoftContact {
-        position,
-        normal,
-        digit: None,
-        friction: 1e-9,
-        torsion_radius: 0.0,
-    }
-}
-
 /// Frictionless point contacts have one unit wrench each, so the hull is that of a few points: its facets are those of
 /// all sets of six whose plane has the other points on one side. On a coarse grid of a box, very many wrenches lie in common
 /// planes.
@@ -89,18 +78,19 @@ fn matches_all_facets_of_frictionless_contacts() {
     let mut closed = [0; 2];
     for case in 0..600 {
         let is_on_grid = case % 2 == 1;
-        let contacts: Vec<SoftContact> = (0..7 + case / 2 % 7)
+        let places: Vec<(Vec3, Vec3)> = (0..7 + case / 2 % 7)
             .map(|k| {
                 let mut step = || random.index(3) as f32 * 0.03 - 0.03;
                 let grid_point = Vec3::new(step(), step(), step());
                 let side = Vec3::AXES[k % 3] * if k / 3 % 2 == 0 { 1.0 } else { -1.0 };
                 if is_on_grid {
-                    frictionless(grid_point.reject_from_normalized(side) + side * 0.03, side)
+                    (grid_point.reject_from_normalized(side) + side * 0.03, side)
                 } else {
-                    frictionless(random.direction() * 0.05, random.direction())
+                    (random.direction() * 0.05, random.direction())
                 }
             })
             .collect();
+        let contacts = contacts_at(&places, 1e-9, 0.0);
         let load = load(0.3, Vec3::Y, 0.03);
         let wrenches: Vec<[f64; 6]> = contacts
             .iter()
@@ -193,7 +183,6 @@ fn normal_of_plane(points: &[[f64; 6]]) -> Option<[f64; 6]> {
     Some(unit(normal))
 }
 
-/// And a required value only shortens the search.
 #[test]
 fn more_contacts_never_reduce_epsilon() {
     let mut random = Random::new(9);
@@ -221,21 +210,17 @@ fn more_contacts_never_reduce_epsilon() {
 
 #[test]
 fn torques_are_scaled_by_half_the_span_of_the_contacts_within_a_hands_lengths() {
+    let place = Vec3::new(0.3, -0.2, 0.1);
     let pair = |half: f32| {
-        let place = Vec3::new(0.3, -0.2, 0.1);
-        contacts_at(
-            &[
-                (place + Vec3::X * half, Vec3::X),
-                (place - Vec3::X * half, Vec3::NEG_X),
-            ],
-            0.6,
-            0.002,
-        )
+        [
+            (place + Vec3::X * half, Vec3::X),
+            (place - Vec3::X * half, Vec3::NEG_X),
+        ]
     };
     let [shortest, longest] = HAND_LENGTHS;
     for (half, length) in [(0.001, shortest), (0.04, 0.04), (0.3, longest)] {
-        let scale = TorqueScale::of(&pair(half));
-        assert!((scale.centre - Vec3::new(0.3, -0.2, 0.1)).length() < 1e-6);
+        let scale = TorqueScale::of(&contacts_at(&pair(half), 0.6, 0.002));
+        assert!(scale.centre.distance(place) < 1e-6);
         assert!((scale.length - length).abs() < 1e-6, "{half}: {}", scale.length);
     }
 }

@@ -1,12 +1,6 @@
 //! Hands at handles and hooks.
 
-use grasp_synthesis::{
-    geometry::handles::Handle,
-    propose::{
-        handles::{HangingPlaces, wrap_handle},
-        proposal::propose_evenly,
-    },
-};
+use grasp_synthesis::{geometry::handles::Handle, propose::handles::HangingPlaces};
 
 use crate::prelude::*;
 
@@ -16,34 +10,6 @@ fn handles(mesh: TriangleMesh) -> Vec<Handle> {
 
 fn places(object: GraspObject) -> Vec<Handle> {
     prepared(&Arc::new(object)).handles().places().to_vec()
-}
-
-/// How many of 300 hands hold an object.
-fn holding(
-    object: &Arc<GraspObject>,
-    hand: Handedness,
-    propose: impl Fn(&ProposalContext<'_>, &mut AttemptStream) -> Option<Proposal>,
-) -> usize {
-    let context = place(object, adult(hand));
-    let scene = ObjectScene::new(object, THESIS_FRICTION);
-    let mut gripper = Gripper::default();
-    (0..300)
-        .filter(|&index| {
-            let proposal = propose(&context, &mut AttemptStream::new(4, index));
-            proposal.is_some_and(|proposal| {
-                gripper
-                    .grip(
-                        &scene,
-                        context.rig,
-                        &proposal,
-                        None,
-                        &mut Stopwatch::off(),
-                        Stop::NEVER,
-                    )
-                    .is_ok()
-            })
-        })
-        .count()
 }
 
 #[test]
@@ -90,9 +56,6 @@ fn the_ear_of_a_pot_is_its_handle_and_a_spout_is_not() {
     // What is off the ear is not on the handle.
     assert!(!prepared(&pot).handles().contain(Vec3::new(-0.085, 0.008, 0.0)));
     assert!(!prepared(&pot).handles().contain(Vec3::new(0.0, 0.05, 0.0)));
-    // Hands find hold there.
-    let held = holding(&pot, Handedness::Right, wrap_handle);
-    assert!(held >= 3, "{held} of 300");
 }
 
 #[test]
@@ -107,27 +70,6 @@ fn what_fingers_cannot_wrap_is_no_handle() {
         assert!(handles(mesh).is_empty(), "{name}");
     }
     assert!(places(plate()).is_empty());
-}
-
-#[test]
-fn hands_on_handles_hold_more_often_than_hands_anywhere() {
-    let lying = moved(
-        &cylinder_mesh(0.014, 0.09, 24, 12),
-        Quat::from_rotation_z(1.2),
-        Vec3::ZERO,
-    );
-    for (name, object) in [
-        ("rod", Arc::new(object_of(lying, &[]))),
-        ("ring", Arc::new(object_of(torus(0.09, 0.012, 32), &[]))),
-    ] {
-        let on_handles = |hand| holding(&object, hand, wrap_handle);
-        let [left, right] = [Handedness::Left, Handedness::Right].map(on_handles);
-        let anywhere = holding(&object, Handedness::Right, |context, stream| {
-            propose_evenly(context, stream, Stop::NEVER)
-        });
-        assert!(right > 2 * anywhere && right > 45, "{name} {right} {anywhere}");
-        assert!(left.abs_diff(right) < 45, "{name}: {left} left and {right} right");
-    }
 }
 
 fn hook_places(object: GraspObject, up: Vec3) -> HangingPlaces {

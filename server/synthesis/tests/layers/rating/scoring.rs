@@ -1,10 +1,7 @@
 //! How far a held object gives way, against one system of all joints and springs, with kinematics differentiated
 //! numerically.
 
-use grasp_synthesis::rating::{
-    scoring::{across_long_axis, choice_values, upright_values},
-    stiffness::compliance,
-};
+use grasp_synthesis::rating::stiffness::compliance;
 
 use crate::prelude::*;
 
@@ -15,10 +12,8 @@ const UNKNOWNS: usize = 6 + 15;
 const TIP: f64 = 500.0;
 /// Stiffness of flesh, in N/m.
 const FLESH: f64 = 15_000.0;
-/// Lever of twisted flesh, in metres.
 const LEVER: f64 = 0.0033;
 
-/// A pose with one joint bent by `angle` more.
 fn bent(pose: &HandPose, digit: Digit, joint: usize, angle: f32) -> HandPose {
     let mut bent = *pose;
     let angles = &mut bent.digits[digit.index()];
@@ -79,7 +74,6 @@ fn stretches(rig: &Rig, pose: &HandPose, contact: &Contact, centre: Vec3) -> [([
     ]
 }
 
-/// Gauss-Jordan elimination with pivoting.
 fn solve(mut rows: Vec<[f64; UNKNOWNS + 1]>) -> [f64; UNKNOWNS] {
     for column in 0..UNKNOWNS {
         let pivot = (column..UNKNOWNS)
@@ -138,83 +132,4 @@ fn compliance_matches_the_system_of_all_springs() {
             assert!((found / expected - 1.0).abs() < 0.01, "{name} {found} {expected}");
         }
     }
-}
-
-/// A wrist at a distance from a point, with palm and fingers leading toward it in a direction.
-fn reaching(target: Vec3, direction: Vec3) -> Pose {
-    // Palm and fingers lead alike: +y and +z of the wrist are both at 45° to the approach.
-    let approach = Vec3::new(0.0, 1.0, 1.0).normalize_or(Vec3::Y);
-    let orientation = Quat::from_rotation_arc(approach, direction);
-    Pose::new(target - direction * 0.12, orientation)
-}
-
-/// Thumb and index finger on two points.
-fn pinch(thumb: Vec3, index: Vec3) -> [Contact; 2] {
-    [(thumb, Digit::Thumb), (index, Digit::Index)].map(|(at, digit)| {
-        let part = HandPart::Phalanx(digit, Phalanx::Third);
-        contact(at, at.normalize_or(Vec3::X), part)
-    })
-}
-
-fn value(object: &GraspObject, wrist: Pose, contacts: &[Contact], term: Term) -> f32 {
-    choice_values(object, wrist, contacts)[term as usize]
-}
-
-fn rod() -> GraspObject {
-    object_of(cylinder_mesh(0.01, 0.1, 24, 12), &[])
-}
-
-/// A body with a bar that sticks out of it along x, between 6 and 18 cm.
-fn pan() -> GraspObject {
-    let mesh: TriangleMesh = Parts::default()
-        .cuboid(Vec3::ZERO, Vec3::new(0.06, 0.02, 0.06), 6)
-        .cuboid(Vec3::new(0.125, 0.0, 0.0), Vec3::new(0.065, 0.01, 0.01), 6)
-        .mesh();
-    object_of(mesh, &[])
-}
-
-#[test]
-fn hands_across_the_long_axis_score_and_those_along_it_do_not() {
-    let rod = rod();
-    let axis = rod.parts().long_axis;
-    assert!(axis.y.abs() > 0.99 && rod.parts().is_long > 0.99);
-    let mut random = Random::new(1);
-    for _ in 0..100 {
-        let across = random.direction().reject_from(Vec3::Y).normalize_or(Vec3::X);
-        assert!(across_long_axis(rod.parts(), reaching(Vec3::ZERO, across)) > 0.99);
-        let along = (Vec3::Y + across * random.between(0.0, 0.3)).normalize_or(Vec3::Y);
-        let end = reaching(Vec3::Y * -0.1, along);
-        assert!(across_long_axis(rod.parts(), end) < 0.05, "{along}");
-    }
-}
-
-#[test]
-fn hands_on_the_handle_score_and_those_on_the_body_do_not() {
-    let pan = pan();
-    assert!(pan.parts().is_handled);
-    let wrist = reaching(Vec3::X * 0.13, Vec3::NEG_Y);
-    let handle = pinch(Vec3::new(0.13, 0.01, 0.0), Vec3::new(0.14, -0.01, 0.0));
-    let body = pinch(Vec3::new(0.0, 0.02, 0.0), Vec3::new(0.0, -0.02, 0.0));
-    assert!(value(&pan, wrist, &handle, Term::OnHandle) > 0.99);
-    assert!(value(&pan, wrist, &body, Term::OnHandle) == 0.0);
-    // A rod is all handle, so nothing sets a part of it apart.
-    let rod = rod();
-    assert!(!rod.parts().is_handled);
-    assert!(value(&rod, wrist, &body, Term::OnHandle) > 0.99);
-}
-
-#[test]
-fn torque_at_the_wrist_grows_with_mass_and_lever() {
-    let light = rod();
-    let load = |distance: f32, object: &GraspObject| {
-        let wrist = Pose::from_position(object.centre_of_mass + Vec3::X * distance);
-        upright_values(object, wrist, Vec3::Y)[Term::WristLoad as usize]
-    };
-    assert!(load(0.1, &light) > 0.99);
-    let heavy = GraspObject::new(cuboid(Vec3::splat(0.05), 4), 6.0, Vec3::ZERO, None, &[]);
-    let heavy = Arc::new(heavy.expect("it is an object"));
-    assert!(load(0.02, &heavy) > load(0.06, &heavy) && load(0.12, &heavy) == 0.0);
-    // Along gravity there is no lever.
-    let above = Pose::from_position(Vec3::Y * 0.12);
-    assert!(upright_values(&heavy, above, Vec3::Y)[Term::WristLoad as usize] > 0.99);
 }

@@ -1,6 +1,6 @@
 //! Which of several valid grasps is answered.
 
-use std::sync::Mutex;
+use std::{cmp::Reverse, sync::Mutex};
 
 use grasp_synthesis::search::{
     FoundGrasp, GraspObserver,
@@ -15,7 +15,6 @@ const BY_SIDE: Differences = Differences {
     region: false,
 };
 
-/// Keeps all it sees.
 #[derive(Debug, Default)]
 struct All(Mutex<Vec<FoundGrasp>>);
 
@@ -33,7 +32,6 @@ impl GraspObserver for All {
     }
 }
 
-/// The valid grasps among some attempts, and the outcome.
 fn found_by(workers: usize) -> (Vec<FoundGrasp>, SearchOutcome) {
     let holdout = floating(bar());
     let all = Arc::new(All::default());
@@ -48,7 +46,6 @@ fn found_by(workers: usize) -> (Vec<FoundGrasp>, SearchOutcome) {
     (found, outcome)
 }
 
-/// One of them.
 fn any_grasp() -> Grasp {
     *found_by(1).0.swap_remove(0).grasp
 }
@@ -72,52 +69,49 @@ fn an_observer_sees_every_valid_grasp_whatever_the_number_of_workers() {
     assert!(one.iter().all(|found| found.grasp.score.is_some()));
 }
 
-/// Grasps of made-up quality and class, some of them equally good.
-fn made_up(random: &mut Random, grasp: &Grasp, number: usize) -> Vec<Alternative> {
-    (0..number)
-        .map(|index| {
-            let handedness = [Handedness::Left, Handedness::Right][random.index(2)];
-            let side = Side {
-                axis: random.index(3) as u8,
-                is_negative: random.index(2) == 0,
-            };
-            Alternative {
-                class: Class {
-                    approach: Some((side, handedness)),
-                    grasp_type: None,
-                    region: Some(Part::Octant(random.index(3) as u8)),
-                },
-                handedness,
-                found: FoundGrasp {
-                    grasp: Box::new(grasp.clone()),
-                    source: if random.index(20) == 0 {
-                        GraspSource::Preferred(index as u16)
-                    } else {
-                        GraspSource::Attempt(index as u64)
-                    },
-                    value: random.index(40) as f32 / 40.0,
-                    at: Duration::ZERO,
-                },
-            }
-        })
-        .collect()
+/// An alternative of made-up quality and class, some of them equally good.
+fn made_up(random: &mut Random, grasp: &Grasp, index: u16) -> Alternative {
+    let handedness = [Handedness::Left, Handedness::Right][random.index(2)];
+    let side = Side {
+        axis: random.index(3) as u8,
+        is_negative: random.index(2) == 0,
+    };
+    let class = Class {
+        approach: Some((side, handedness)),
+        grasp_type: None,
+        region: Some(Part::Octant(random.index(3) as u8)),
+    };
+    let is_preferred = random.index(20) == 0;
+    let found = FoundGrasp {
+        grasp: Box::new(grasp.clone()),
+        source: if is_preferred {
+            GraspSource::Preferred(index)
+        } else {
+            GraspSource::Attempt(index.into())
+        },
+        value: random.index(40) as f32 / 40.0,
+        at: Duration::ZERO,
+    };
+    Alternative {
+        class,
+        handedness,
+        found,
+    }
 }
 
 /// Preferred grips first, then by quality; of equals the first.
-fn rank(alternative: &Alternative) -> (bool, f32, std::cmp::Reverse<u64>) {
-    let (is_preferred, index) = match alternative.found.source {
-        GraspSource::Preferred(index) => (true, u64::from(index)),
-        GraspSource::Attempt(index) => (false, index),
+fn better(a: &Alternative, b: &Alternative) -> std::cmp::Ordering {
+    let rank = |alternative: &Alternative| match alternative.found.source {
+        GraspSource::Preferred(index) => (true, alternative.found.value, Reverse(index.into())),
+        GraspSource::Attempt(index) => (false, alternative.found.value, Reverse(index)),
         other => panic!("none are made of {other:?}"),
     };
-    (is_preferred, alternative.found.value, std::cmp::Reverse(index))
+    rank(b).partial_cmp(&rank(a)).expect("the values are numbers")
 }
 
 fn sources(alternatives: &[Alternative]) -> Vec<GraspSource> {
-    alternatives
-        .iter()
-        .map(|alternative| alternative.found.source)
-        .collect()
+    let found = alternatives.iter().map(|alternative| alternative.found.source);
+    found.collect()
 }
 
 #[test]
@@ -125,21 +119,19 @@ fn the_best_of_the_best_classes_remain_in_whatever_order_they_come() {
     let grasp = any_grasp();
     let mut random = Random::new(11);
     for round in 0..200 {
-        let most = 1 + random.index(9);
-        let number = random.index(120);
-        let mut offered = made_up(&mut random, &grasp, number);
+        let (most, number) = (1 + random.index(9), random.index(120) as u16);
+        let mut offered: Vec<Alternative> = (0..number)
+            .map(|index| made_up(&mut random, &grasp, index))
+            .collect();
         // By force: the best of each class, then the best of those.
-        let better = |a: &Alternative, b: &Alternative| rank(b).partial_cmp(&rank(a)).unwrap();
-        let mut best: Vec<Alternative> = Vec::new();
-        for alternative in &offered {
-            let same = best.iter_mut().find(|kept| kept.class == alternative.class);
-            match same {
-                Some(kept) if better(alternative, kept).is_lt() => *kept = alternative.clone(),
-                Some(_) => {}
-                None => best.push(alternative.clone()),
-            }
-        }
+        let mut best = offered.clone();
         best.sort_by(better);
+        let mut classes = Vec::new();
+        best.retain(|alternative| {
+            let is_new = !classes.contains(&alternative.class);
+            classes.push(alternative.class);
+            is_new
+        });
         best.truncate(most);
         for _ in 0..3 {
             let mut kept = Alternatives::new(most);
@@ -147,15 +139,11 @@ fn the_best_of_the_best_classes_remain_in_whatever_order_they_come() {
                 offered.swap(place, random.index(place + 1));
             }
             for alternative in &offered {
-                if let Some(least) = kept.least() {
-                    // What is skipped below the least quality would not have been kept.
-                    let skipped = alternative.found.value < least && !alternative.found.source.is_preferred();
-                    let mut with = kept.clone();
-                    with.offer(alternative.clone());
-                    let (with, without) = (sources(&with.into_best()), sources(&kept.clone().into_best()));
-                    assert!(!skipped || with == without);
+                let least = kept.least().unwrap_or(0.0);
+                // What is below the least quality would not have been kept.
+                if alternative.found.value >= least || alternative.found.source.is_preferred() {
+                    kept.offer(alternative.clone());
                 }
-                kept.offer(alternative.clone());
             }
             assert_eq!(sources(&kept.into_best()), sources(&best), "round {round}");
         }
@@ -184,16 +172,13 @@ fn the_side_is_the_one_that_the_back_of_the_hand_faces() {
     }
 }
 
-fn contact(x: f32, triangle: u32) -> Contact {
+fn on(x: f32, triangle: u32) -> Contact {
     Contact {
-        position: Vec3::new(x, 0.01, -0.01),
-        normal: Vec3::Y,
         triangle,
-        part: HandPart::Palm,
+        ..contact(Vec3::new(x, 0.01, -0.01), Vec3::Y, HandPart::Palm)
     }
 }
 
-/// The part that contacts are on.
 fn part(object: &GraspObject, contacts: &[Contact]) -> Option<Part> {
     let mut grasp = any_grasp();
     grasp.contacts = contacts.to_vec();
@@ -216,7 +201,7 @@ fn the_part_is_the_region_with_most_contacts_or_an_eighth_of_the_box() {
         zones: zones.to_vec(),
     };
     // The contacts' middle is at x = -0.01, in the lower halves of x and z and in the upper half of y.
-    let contacts = [contact(-0.09, 5), contact(0.03, 3), contact(0.03, 4)];
+    let contacts = [on(-0.09, 5), on(0.03, 3), on(0.03, 4)];
     assert_eq!(part(&object, &contacts), Some(Part::Octant(0b010)));
     let triangles = object.mesh.triangles().len();
     let regions = Regions::new(
@@ -231,7 +216,7 @@ fn the_part_is_the_region_with_most_contacts_or_an_eighth_of_the_box() {
     // Two contacts are on the second and on the third.
     assert_eq!(part(&object, &contacts), Some(Part::Region(Some(1))));
     assert_eq!(part(&object, &contacts[..1]), Some(Part::Region(Some(0))));
-    assert_eq!(part(&object, &[contact(0.0, 9)]), Some(Part::Region(None)));
+    assert_eq!(part(&object, &[on(0.0, 9)]), Some(Part::Region(None)));
 }
 
 /// Attempts after the first valid one of which another is preferred if a person would choose it.
@@ -243,7 +228,6 @@ fn search(holdout: &Holdout, seed: u64) -> Search<'_> {
     guided(holdout).seed(seed).max_attempts(1000)
 }
 
-/// The outcome of one attempt.
 fn outcome_of(holdout: &Holdout, seed: u64, attempt: u64) -> SearchOutcome {
     let one = search(holdout, seed).first_attempt(attempt).max_attempts(1);
     one.run()

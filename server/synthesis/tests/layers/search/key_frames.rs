@@ -1,6 +1,5 @@
 //! The motions to grasps on the built-in objects, checked at many moments of the motion.
 
-use grasp_assets::holdouts::BuiltInHoldout;
 use grasp_synthesis::{
     model::grasp::{KeyFrame, Stage},
     search::key_frames::{APPROACH_DISTANCE, OPEN_CLEARANCE, key_frames},
@@ -11,16 +10,12 @@ use crate::prelude::*;
 /// Rounding of distances, in metres, and the accuracy of a motion.
 const TOLERANCE: f32 = 0.00015;
 
-/// Grips tried per object.
-const GRIPS: usize = 120;
-
 /// Moments checked per motion: fingertips move about half a millimetre between them.
 const MOMENTS: usize = 120;
 
 /// Ways followed moment by moment per holdout: following takes far longer than planning.
 const FOLLOWED: usize = 4;
 
-/// A grasp on a holdout, and the motion to it.
 struct Planned {
     name: String,
     holdout: Holdout,
@@ -28,44 +23,26 @@ struct Planned {
     motion: Option<[KeyFrame; 3]>,
 }
 
-/// Grasps on a holdout, and their motions.
-fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>) -> Vec<Planned> {
-    let scene = object_scene(&holdout.object);
-    let presented = Presented::of(holdout);
-    let grasps = valid_grips(holdout, &grips.atlas()).into_iter().flatten();
-    grasps
-        .map(|grasp| Planned {
-            name: name.to_owned(),
-            holdout: holdout.clone(),
-            motion: key_frames(&scene, &presented, right(), None, &grasp),
-            grasp,
-        })
-        .collect()
+fn plan(holdout: &Holdout, name: &str) -> Vec<Planned> {
+    let (scene, presented) = (object_scene(&holdout.object), Presented::of(holdout));
+    let grasps = valid_grips(holdout, &every(12, name_of(&holdout.object)));
+    let planned = grasps.into_iter().flatten().map(|grasp| Planned {
+        name: name.to_owned(),
+        holdout: holdout.clone(),
+        motion: key_frames(&scene, &presented, right(), None, &grasp),
+        grasp,
+    });
+    planned.collect()
 }
 
 /// Grasps on the built-in holdouts, and on the same objects floating freely.
 static PLANNED: LazyLock<Vec<Planned>> = LazyLock::new(|| {
-    let mut planned = Vec::new();
-    for object in OBJECT_NAMES {
-        let held = |holdout: &&BuiltInHoldout| holdout.object == object;
-        let first = holdouts().iter().find(held).expect("every object has holdouts");
-        let first = first.to_holdout().expect("the built-in holdout is sound");
-        let grips = grown_to(&first.object, right(), GRIPS);
-        for holdout in holdouts().iter().filter(held) {
-            let name = &holdout.name;
-            let holdout = holdout.to_holdout().expect("the built-in holdout is sound");
-            planned.extend(plan(name, &holdout, &grips));
-        }
-        let free = Holdout {
-            presenting_hand: None,
-            ..first.clone()
-        };
-        planned.extend(plan(object, &free, &grips));
-    }
-    planned
+    let free = OBJECT_NAMES.map(|name| floating(Arc::clone(object(name))));
+    let all = tracked_holdouts().chain(free).enumerate();
+    all.flat_map(|(place, holdout)| plan(&holdout, &format!("holdout {place}")))
+        .collect()
 });
 
-/// The first motions of each holdout.
 fn followed() -> impl Iterator<Item = (&'static Planned, &'static [KeyFrame; 3])> {
     let of_holdouts = PLANNED.chunk_by(|a, b| a.name == b.name);
     of_holdouts.flat_map(|planned| {
@@ -180,7 +157,6 @@ fn motions_keep_clear() {
     assert!(count > 30, "{count} motions");
 }
 
-/// The direction of approach.
 fn direction_of(motion: &[KeyFrame; 3]) -> Vec3 {
     let [from, to] = [&motion[0], &motion[1]].map(|frame| frame.pose.frame_from_wrist.position);
     (to - from).normalize_or_zero()

@@ -2,7 +2,6 @@
 
 use grasp_synthesis::{
     physical::immobility::{MAX_CONTACT_FORCE, MAX_CONTACTS},
-    propose::prepared::hand_span,
     search::limits::Limit,
 };
 
@@ -12,14 +11,12 @@ fn of_mass(mesh: TriangleMesh, mass: f32, forbidden: &[u32]) -> GraspObject {
     GraspObject::new(mesh, mass, Vec3::ZERO, None, forbidden).expect("the object is sound")
 }
 
-/// Triangles with a corner below a height.
 fn below(mesh: &TriangleMesh, height: f32) -> Vec<u32> {
     triangles_where(mesh, |triangle| {
         mesh.corners(triangle).iter().any(|corner| corner.y < height)
     })
 }
 
-/// The limits of a right hand.
 fn limits_of(object: GraspObject) -> Vec<Limit> {
     limits_in(&floating(object))
 }
@@ -28,7 +25,6 @@ fn limits_in(holdout: &Holdout) -> Vec<Limit> {
     guided(holdout).limits()
 }
 
-/// The only limit.
 fn only(limits: &[Limit]) -> Limit {
     assert_eq!(limits.len(), 1, "{limits:?}");
     limits[0]
@@ -169,39 +165,6 @@ fn an_object_beyond_the_receivers_reach_or_arm_is_limited_by_reach() {
     assert_eq!(limits_at(0.8), [[], []]);
 }
 
-/// The largest distance of two fingertips over random poses.
-fn farthest_fingertips(rig: &Rig, random: &mut Random) -> f32 {
-    let mut farthest = 0.0_f32;
-    for _ in 0..20_000 {
-        let angles = random.angles(rig);
-        let tips: [Vec3; 5] =
-            std::array::from_fn(|i| digit_frames(&rig.digits[i], Pose::IDENTITY, angles[i]).tip);
-        for (i, a) in tips.iter().enumerate() {
-            farthest = tips[..i]
-                .iter()
-                .fold(farthest, |most, b| most.max(a.distance(*b)));
-        }
-    }
-    farthest
-}
-
-#[test]
-fn no_pose_exceeds_the_span() {
-    let mut random = Random::new(21);
-    for hand in all_hands() {
-        let rig: &PreparedRig = &hand.rig;
-        let span = hand_span(rig);
-        let farthest = farthest_fingertips(rig, &mut random);
-        // The span includes the palm's heel and the skin around the fingertips.
-        assert!(
-            farthest < span && span < 1.6 * farthest,
-            "{}: {farthest}, {span}",
-            rig.name
-        );
-    }
-}
-
-/// Objects that people hold.
 fn everyday_objects() -> Vec<(String, Arc<GraspObject>)> {
     let mut objects: Vec<_> = OBJECT_NAMES
         .map(|name| (name.to_owned(), Arc::clone(object(name))))

@@ -6,7 +6,7 @@ use std::{
         OnceLock,
         atomic::{AtomicBool, AtomicU64},
     },
-    thread::{self, ThreadId},
+    thread,
 };
 
 use crate::prelude::*;
@@ -28,7 +28,22 @@ fn hash(outcome: &SearchOutcome) -> u64 {
     }
     add(report.attempt().unwrap_or(u64::MAX));
     if let Some(grasp) = &outcome.grasp {
-        for number in numbers(grasp) {
+        let wrist = grasp.pose.frame_from_wrist;
+        let mut numbers = vec![grasp.wrench_angle, grasp.comfort];
+        numbers.extend(wrist.position.to_array());
+        numbers.extend(wrist.orientation.to_array());
+        for digit in &grasp.pose.digits {
+            let pitches = [digit.base_pitch, digit.second_pitch, digit.third_pitch];
+            numbers.push(digit.base_yaw);
+            numbers.extend(pitches);
+        }
+        numbers.extend(grasp.bend_ratios.map(|ratio| ratio.unwrap_or(-1.0)));
+        for contact in &grasp.contacts {
+            numbers.extend(contact.position.to_array());
+            numbers.extend(contact.normal.to_array());
+        }
+        numbers.extend(grasp.forces.iter().flat_map(Vec3::to_array));
+        for number in numbers {
             add(u64::from(number.to_bits()));
         }
         for contact in &grasp.contacts {
@@ -40,29 +55,6 @@ fn hash(outcome: &SearchOutcome) -> u64 {
         }
     }
     hash
-}
-
-/// Every number of a grasp.
-fn numbers(grasp: &Grasp) -> Vec<f32> {
-    let mut numbers = vec![grasp.wrench_angle, grasp.comfort];
-    let wrist = grasp.pose.frame_from_wrist;
-    numbers.extend(wrist.position.to_array());
-    numbers.extend(wrist.orientation.to_array());
-    for angles in &grasp.pose.digits {
-        numbers.extend([
-            angles.base_yaw,
-            angles.base_pitch,
-            angles.second_pitch,
-            angles.third_pitch,
-        ]);
-    }
-    numbers.extend(grasp.bend_ratios.map(|ratio| ratio.unwrap_or(-1.0)));
-    for contact in &grasp.contacts {
-        numbers.extend(contact.position.to_array());
-        numbers.extend(contact.normal.to_array());
-    }
-    numbers.extend(grasp.forces.iter().flat_map(Vec3::to_array));
-    numbers
 }
 
 /// The search has the same outcome for numbers of workers and threads.
@@ -80,7 +72,6 @@ fn assert_same(search: &Search<'_>, one: &SearchOutcome, pools: &[(usize, usize)
 /// with every change of a draw or a rounding.
 const GOLDEN: u64 = 0x1594_CA74_F345_7B4E;
 
-/// Grasp and report are the same for 1, 2, 4 and 7 workers on any pool, and match the golden result.
 #[test]
 fn reproducible_searches_match_for_any_number_of_workers() {
     let mut hashes = Vec::new();
@@ -198,69 +189,41 @@ fn runs_no_more_attempts_than_there_are() {
     assert_eq!(last.run().report.attempts, 1);
 }
 
-/// A clock that sets a flag, or panics, on one of its readings.
-struct TrapClock<'a> {
-    readings: AtomicU64,
-    at: u64,
-    stop: Option<&'a AtomicBool>,
-}
+struct ClockBy<F>(F);
 
-impl Clock for TrapClock<'_> {
+impl<F: Fn() -> Duration + Sync> Clock for ClockBy<F> {
     fn now(&self) -> Duration {
-        if self.readings.fetch_add(1, Ordering::SeqCst) == self.at {
-            match self.stop {
-                Some(stop) => stop.store(true, Ordering::SeqCst),
-                None => panic!("the clock is broken"),
-            }
-        }
-        Duration::ZERO
+        self.0()
     }
 }
 
 /// A clock that paces two workers. The first to read it is the leader: it enters an attempt, and only then may the
 /// follower take the next one. There the leader waits until the follower has read the clock `wait_for` times; from then
 /// on the leader reads `late`.
-struct PaceClock {
-    leader: OnceLock<ThreadId>,
-    readings: [AtomicU64; 2],
-    wait_for: u64,
-    late: Duration,
-}
-
-impl PaceClock {
-    fn new(wait_for: u64, late: Duration) -> Self {
-        Self {
-            leader: OnceLock::new(),
-            readings: Default::default(),
-            wait_for,
-            late,
-        }
-    }
-
-    fn wait_until(&self, worker: usize, readings: u64) {
-        while self.readings[worker].load(Ordering::SeqCst) < readings {
-            thread::yield_now();
-        }
-    }
-}
-
-impl Clock for PaceClock {
-    fn now(&self) -> Duration {
+fn pacing(wait_for: u64, late: Duration) -> ClockBy<impl Fn() -> Duration + Sync> {
+    let leader = OnceLock::new();
+    let readings: [AtomicU64; 2] = Default::default();
+    ClockBy(move || {
+        let wait_until = |worker: usize, least: u64| {
+            while readings[worker].load(Ordering::SeqCst) < least {
+                thread::yield_now();
+            }
+        };
         let own = thread::current().id();
-        let leads = *self.leader.get_or_init(|| own) == own;
-        let reading = self.readings[usize::from(!leads)].fetch_add(1, Ordering::SeqCst);
+        let leads = *leader.get_or_init(|| own) == own;
+        let reading = readings[usize::from(!leads)].fetch_add(1, Ordering::SeqCst);
         match (leads, reading) {
             // The leader has taken its attempt by its second reading.
-            (false, 0) => self.wait_until(0, 2),
-            (true, 1) => self.wait_until(1, self.wait_for),
+            (false, 0) => wait_until(0, 2),
+            (true, 1) => wait_until(1, wait_for),
             _ => {}
         }
         if leads && reading > 0 {
-            self.late
+            late
         } else {
             Duration::ZERO
         }
-    }
+    })
 }
 
 /// The attempt that the deadline cut short might have been valid.
@@ -280,7 +243,7 @@ fn a_valid_attempt_does_not_win_after_an_interrupted_earlier_one() {
     let both = alone.first_attempt(valid - 1).max_attempts(2).workers(2);
     for reproducible in [true, false] {
         let search = both.clone().reproducible(reproducible);
-        let clock = PaceClock::new(counting.readings(), Duration::from_secs(2));
+        let clock = pacing(counting.readings(), Duration::from_secs(2));
         let outcome = search.run_under(&pool, &clock);
         let (end, attempt) = if reproducible {
             (SearchEnd::DeadlinePassed, None)
@@ -303,15 +266,17 @@ fn a_flag_stops_within_an_attempt_that_then_does_not_count() {
     for at in [1, 2, 5, 17, 100, 1001] {
         for workers in [1, 3] {
             let stop = AtomicBool::new(false);
-            let clock = TrapClock {
-                readings: AtomicU64::new(0),
-                at,
-                stop: Some(&stop),
-            };
+            let readings = AtomicU64::new(0);
+            let clock = ClockBy(|| {
+                if readings.fetch_add(1, Ordering::SeqCst) == at {
+                    stop.store(true, Ordering::SeqCst);
+                }
+                Duration::ZERO
+            });
             let search = endless.clone().workers(workers);
             let outcome = search.run_with(&pool(workers), &clock, &stop);
             assert_eq!(outcome.end, SearchEnd::Stopped);
-            let readings = clock.readings.into_inner();
+            let readings = readings.load(Ordering::SeqCst);
             // Each worker checks the flag before it reads the clock, so no worker reads it more than once afterwards.
             assert!(readings <= at + 1 + workers as u64, "{readings} {at}");
             assert_eq!(
@@ -392,11 +357,14 @@ fn a_panic_reaches_the_caller_and_leaves_the_pool_usable() {
     for workers in [1, 2, 4] {
         let pool = pool(workers);
         let stop = AtomicBool::new(false);
-        let trap = TrapClock {
-            readings: AtomicU64::new(0),
-            at: 200,
-            stop: None,
-        };
+        let readings = AtomicU64::new(0);
+        let trap = ClockBy(|| {
+            assert!(
+                readings.fetch_add(1, Ordering::SeqCst) < 200,
+                "the clock is broken"
+            );
+            Duration::ZERO
+        });
         let broken = endless.clone().workers(workers);
         let result = catch_unwind(AssertUnwindSafe(|| broken.run_with(&pool, &trap, &stop)));
         assert!(result.is_err());

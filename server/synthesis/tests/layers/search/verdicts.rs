@@ -16,67 +16,6 @@ fn failed(judgement: &Judgement) -> Vec<Check> {
     failed.map(|verdict| verdict.check).collect()
 }
 
-fn assert_same(grasp: &Grasp, judged: &Judgement, what: &str) {
-    assert_eq!(failed(judged), [], "{what}: {:#?}", judged.verdicts);
-    let checks: Vec<Check> = judged.verdicts.iter().map(|verdict| verdict.check).collect();
-    assert_eq!(checks, Check::OF_HAND, "{what}");
-    let (a, b) = (
-        grasp.margins.expect("it is a physical grasp"),
-        judged.grasp.margins.expect("it is judged physically"),
-    );
-    for (a, b) in [
-        (Some(a.penetration), Some(b.penetration)),
-        (Some(a.epsilon), Some(b.epsilon)),
-        (a.giver_clearance, b.giver_clearance),
-        (a.obstacle_clearance, b.obstacle_clearance),
-        (Some(a.residual), Some(b.residual)),
-    ] {
-        let off = a.zip(b).map_or(0.0, |(a, b)| a - b);
-        assert!(
-            a.is_some() == b.is_some() && off.abs() < 1e-5,
-            "{what}: {a:?} {b:?}"
-        );
-    }
-    assert_eq!(grasp.contacts, judged.grasp.contacts, "{what}");
-    assert_eq!(grasp.hangs, judged.grasp.hangs, "{what}");
-    assert!((score(grasp) - score(&judged.grasp)).abs() < 1e-4, "{what}");
-}
-
-#[test]
-fn grasps_that_searches_find_are_valid_with_the_same_figures() {
-    let pool = pool(1);
-    let mut found = 0;
-    for (place, holdout) in tracked_holdouts().enumerate() {
-        for side in [Handedness::Left, Handedness::Right] {
-            for seed in 0..2 {
-                let search = guided(&holdout).rig(adult(side)).seed(seed).max_attempts(300);
-                if let Some(grasp) = search.run_on(&pool).grasp {
-                    found += 1;
-                    let what = format!("holdout {place}, {side:?}, seed {seed}");
-                    assert_same(&grasp, &search.judge(&grasp.pose), &what);
-                }
-            }
-        }
-    }
-    assert!(found >= 20, "{found}");
-}
-
-#[test]
-fn hooks_are_valid_with_the_same_figures_and_not_upside_down() {
-    let object = Arc::new(lunch_box(0.047));
-    let holdout = Holdout::new(Arc::clone(&object), None, Vec3::Y).expect("up is a unit vector");
-    let search = guided(&holdout).requirements(without_thumb()).max_attempts(3000);
-    let grasp = search.grasp().expect("it hangs by its handle");
-    assert!(grasp.hangs);
-    assert_same(&grasp, &search.judge(&grasp.pose), "a hook");
-    let upside_down = Holdout::new(object, None, Vec3::NEG_Y).expect("up is a unit vector");
-    let judged = guided(&upside_down).judge(&grasp.pose);
-    assert!(!judged.is_valid() && !judged.grasp.hangs && judged.grasp.score.is_none());
-    let holds = |check| verdict(&judged, check).passed;
-    assert!(!holds(Check::Closure) || !holds(Check::Balance));
-}
-
-/// A valid hand on a bar, and its holdout.
 fn on_bar() -> (Holdout, Grasp) {
     let holdout = floating(bar());
     let search = guided(&holdout).max_attempts(500);
@@ -90,15 +29,6 @@ fn moved(pose: &HandPose, offset: Vec3) -> HandPose {
     moved
 }
 
-/// Samples of a solid's axis with the radius there.
-fn spheres(solid: &TaperedCapsule) -> impl Iterator<Item = (Vec3, f32)> {
-    let solid = *solid;
-    (0..=400).map(move |step| {
-        let along = step as f32 / 400.0;
-        (solid.at(along), solid.radius_at(along))
-    })
-}
-
 #[test]
 fn depth_is_that_of_the_deepest_sphere_in_a_box() {
     let (holdout, grasp) = on_bar();
@@ -110,7 +40,7 @@ fn depth_is_that_of_the_deepest_sphere_in_a_box() {
     for _ in 0..40 {
         let pose = moved(&grasp.pose, random.direction() * random.between(0.0, 0.006));
         let solids = HandSolids::of_pose(right(), &pose);
-        let all: Vec<(Vec3, f32)> = solids.iter().flat_map(spheres).collect();
+        let all: Vec<(Vec3, f32)> = solids.iter().flat_map(|solid| balls(solid, 400)).collect();
         if all.iter().any(|&(centre, _)| outside(centre) == 0.0) {
             continue;
         }
@@ -174,7 +104,7 @@ fn distances_name_the_nearest_hand_and_obstacle() {
         // By samples: the same hand, moved.
         let brute = tracked
             .iter()
-            .flat_map(spheres)
+            .flat_map(|solid| balls(solid, 400))
             .map(|(centre, radius)| {
                 let from = |solid: &TaperedCapsule| solid.signed_distance(centre - Vec3::X * 0.8);
                 tracked.iter().map(from).fold(f32::INFINITY, f32::min) - radius

@@ -2,9 +2,7 @@
 
 use crate::prelude::*;
 use grasp_synthesis::geometry::mesh_bvh::MeshPoint;
-use grasp_synthesis::thesis::finger_posing::{
-    PosedDigit, find_touching_finger_pose, hand_motion, missing_contacts,
-};
+use grasp_synthesis::thesis::finger_posing::{PosedDigit, find_touching_finger_pose, hand_motion};
 use grasp_synthesis::thesis::wrist_placement::{WRIST_DISTANCE, WristFrame, WristPlacer};
 
 fn place(holdout: &Holdout, rig: &Rig, strategy: Strategy, attempt: u64) -> (Pose, u64) {
@@ -17,39 +15,6 @@ fn place(holdout: &Holdout, rig: &Rig, strategy: Strategy, attempt: u64) -> (Pos
 
 fn scenes() -> [Holdout; 4] {
     [floating(bar()), held(bar()), held(plate()), held(rod())]
-}
-
-/// Strategy A prunes nothing and fills C - B: the share of positions within half the reach is that of the volumes.
-#[test]
-fn naive_placements_are_uniform_in_the_shell() {
-    let (holdout, rig) = (floating(bar()), simple_rig());
-    let rounds = 20_000;
-    let mut within = 0;
-    let mut mean_axis = DVec3::ZERO;
-    for attempt in 0..rounds {
-        let (pose, pruned) = place(&holdout, rig, Strategy::A, attempt);
-        assert_eq!(pruned, 0);
-        let outside = holdout.object.bounding_box.distance(pose.position);
-        assert!(outside > 0.0 && outside <= rig.reach * 1.0001);
-        within += u32::from(outside <= rig.reach / 2.0);
-        mean_axis += (pose.orientation * Vec3::Y).as_dvec3();
-    }
-    // Steiner: the shell of width r around a box has faces · r + (π/4) edges · r² + (4π/3) r³.
-    let edges = holdout.object.bounding_box.half_extents.as_dvec3() * 2.0;
-    let faces = 2.0 * (edges.x * edges.y + edges.y * edges.z + edges.z * edges.x);
-    let lengths = 4.0 * (edges.x + edges.y + edges.z);
-    let shell = |r: f64| {
-        faces * r
-            + std::f64::consts::FRAC_PI_4 * lengths * r * r
-            + 4.0 / 3.0 * std::f64::consts::PI * r.powi(3)
-    };
-    let reach = f64::from(rig.reach);
-    let expected = shell(reach / 2.0) / shell(reach);
-    let share = f64::from(within) / rounds as f64;
-    // Four standard deviations.
-    let tolerance = 4.0 * (expected * (1.0 - expected) / rounds as f64).sqrt();
-    assert!((share - expected).abs() < tolerance, "{share}, not {expected}");
-    assert!(mean_axis.length() / (rounds as f64) < 4.0 / (rounds as f64).sqrt());
 }
 
 /// From the same stream, the first placement with all measures in range is returned, after as many prunes.
@@ -118,28 +83,6 @@ pub(super) fn is_in_range(holdout: &Holdout, rig: &Rig, wrist: Pose, strategy: S
     (strategy < Strategy::B || by_object) && (strategy < Strategy::C || by_giver)
 }
 
-/// The measures would allow more than the reach.
-#[test]
-fn a_short_hand_stays_within_its_reach() {
-    let short = Rig {
-        reach: 0.07,
-        palm: Vec3::new(0.0, 0.02, 0.005),
-        ..Rig::clone(simple_rig())
-    };
-    let holdout = floating(bar());
-    let outside = |strategy, attempt| {
-        let (pose, _) = place(&holdout, &short, strategy, attempt);
-        holdout.object.bounding_box.distance(pose.position)
-    };
-    for strategy in [Strategy::A, Strategy::B] {
-        let farthest = (0..300)
-            .map(|attempt| outside(strategy, attempt))
-            .fold(0.0, f32::max);
-        assert!(farthest > 0.05 && farthest <= short.reach * 1.0001, "{farthest}");
-    }
-}
-
-/// The end of closing.
 #[derive(Debug, PartialEq)]
 struct Closed {
     angles: DigitAngles,
@@ -232,7 +175,6 @@ fn wrists(holdout: &Holdout) -> Vec<WristFrame> {
     placed.concat()
 }
 
-/// Poses, ratios and contacts, for all ways of choosing ratios.
 #[test]
 fn closing_matches_the_slow_reference() {
     let rig = simple_rig();
@@ -279,69 +221,4 @@ fn closing_matches_the_slow_reference() {
     }
     // The comparison covers every way for closing to end.
     assert!(touching > 500 && proximal > 20 && proximal_only > 20 && free > 500);
-}
-
-#[test]
-fn each_choice_uses_its_own_bend_ratios() {
-    // A wall close in front of the stretched hand: every digit touches it with any ratio.
-    let wall = object_of(cuboid(Vec3::new(0.5, 0.5, 0.01), 2), &[]);
-    let wrist = WristFrame::new(Pose::from_position(Vec3::new(0.0, 0.0, -0.045)));
-    let motion = hand_motion(simple_rig());
-    let used = |choice: BendRatioChoice, digit: Digit| {
-        let mut counts = [0_u32; 3];
-        for attempt in 0..300 {
-            let mut stream = AttemptStream::new(6, attempt);
-            let posed =
-                find_touching_finger_pose(&wall, &wrist, &motion[digit.index()], digit, choice, &mut stream);
-            match posed.bend_ratio {
-                Some(0.7) => counts[0] += 1,
-                Some(1.0) => counts[1] += 1,
-                Some(1.42) => counts[2] += 1,
-                other => panic!("{digit:?} touches with {other:?}"),
-            }
-        }
-        counts.map(|count| count > 0)
-    };
-    for digit in [Digit::Thumb, Digit::Index, Digit::Little] {
-        let thumb = digit == Digit::Thumb;
-        // Tried in turn, the first succeeds here.
-        for (choice, expected) in [
-            (BendRatioChoice::All, [true, false, false]),
-            (BendRatioChoice::AllFingersWithoutLow, [thumb, !thumb, false]),
-            (BendRatioChoice::OneRandom, [true; 3]),
-            (BendRatioChoice::OneRandomFingersWithoutLow, [thumb, true, true]),
-            (BendRatioChoice::OnlyOne, [false, true, false]),
-            (BendRatioChoice::OnlyHigh, [false, false, true]),
-        ] {
-            assert_eq!(used(choice, digit), expected, "{choice:?} {digit:?}");
-        }
-    }
-}
-
-/// `GRASPINGCONTACTSEXIST` for every combination.
-#[test]
-fn missing_contacts_are_rejected_by_kind() {
-    let free = PosedDigit::default();
-    let mut touching = free;
-    touching.hits[2] = Some(MeshPoint {
-        position: Vec3::ZERO,
-        distance: 0.0,
-        triangle: 0,
-    });
-    for strategy in Strategy::LADDER {
-        let missing = |thumb, finger| missing_contacts(strategy, &[thumb, free, free, finger, free]);
-        let is_early = strategy >= Strategy::D;
-        let of_thumb = |later| {
-            Some(if is_early {
-                Rejection::NoThumbEarlyStop
-            } else {
-                later
-            })
-        };
-        assert_eq!(missing(touching, touching), None);
-        assert_eq!(missing(touching, free), Some(Rejection::NoFingers));
-        assert_eq!(missing(free, touching), of_thumb(Rejection::NoThumb));
-        assert_eq!(missing(free, free), of_thumb(Rejection::NoContacts));
-        assert!(!is_early || missing_contacts(strategy, &[free]) == Some(Rejection::NoThumbEarlyStop));
-    }
 }

@@ -40,37 +40,31 @@ impl Shape {
     }
 
     /// The shape, thinned to leave room for flesh around the bones.
-    fn fitted(self, bones: &[Vec3]) -> Self {
+    fn fitted(mut self, bones: &[Vec3]) -> Self {
         let room = bones
             .iter()
             .map(|&bone| (bone - self.foot(bone).0).length() - FLESH);
         let most = room.fold(f32::INFINITY, f32::min).max(0.5);
-        match self {
-            Self::Ball(centre, radius) => Self::Ball(centre, radius.min(most)),
-            Self::Rod(start, axis, radius) => Self::Rod(start, axis, radius.min(most)),
-            Self::Disk(middle, axis, radius) => Self::Disk(middle, axis, radius.min(most)),
-            Self::Plate(middle, thin, half) => Self::Plate(middle, thin, half.min(most)),
-        }
+        let (Self::Ball(_, size) | Self::Rod(_, _, size) | Self::Disk(_, _, size) | Self::Plate(_, _, size)) =
+            &mut self;
+        *size = size.min(most);
+        self
     }
 
-    /// Its surface, in metres.
     fn mesh(self) -> TriangleMesh {
         let placed = |mesh: &TriangleMesh, axis: Vec3, middle: Vec3| {
             let turn = Quat::from_rotation_arc(Vec3::Y, axis.normalize_or(Vec3::Y));
             moved(mesh, turn, middle * 1e-3)
         };
         match self {
-            Self::Ball(centre, radius) => Parts::default()
-                .sphere(centre * 1e-3, radius * 1e-3, 12, true)
-                .mesh(),
-            Self::Rod(middle, axis, radius) => {
-                placed(&cylinder_mesh(radius * 1e-3, 0.12, 24, 12), axis, middle)
+            Self::Ball(centre, size) => {
+                let ball = Parts::default().sphere(centre * 1e-3, size * 1e-3, 12, true);
+                ball.mesh()
             }
-            Self::Disk(middle, axis, radius) => {
-                placed(&cylinder_mesh(radius * 1e-3, 0.01, 24, 2), axis, middle)
-            }
-            Self::Plate(middle, thin, half) => {
-                placed(&cuboid(Vec3::new(0.04, half * 1e-3, 0.04), 2), thin, middle)
+            Self::Rod(middle, axis, size) => placed(&cylinder_mesh(size * 1e-3, 0.12, 24, 12), axis, middle),
+            Self::Disk(middle, axis, size) => placed(&cylinder_mesh(size * 1e-3, 0.01, 24, 2), axis, middle),
+            Self::Plate(middle, thin, size) => {
+                placed(&cuboid(Vec3::new(0.04, size * 1e-3, 0.04), 2), thin, middle)
             }
         }
     }
@@ -79,41 +73,29 @@ impl Shape {
 /// From a finger's bone to its skin, in millimetres.
 const FLESH: f32 = 7.0;
 
-/// The far end of a link.
 pub(crate) const TIP: f32 = 1.0;
-/// Halfway along a link.
 pub(crate) const MIDDLE: f32 = 0.5;
 
 /// A touching link, and the share of its bone where it touches.
 pub(crate) type Touching = (Digit, Phalanx, f32);
 
-/// A grasp posed by hand.
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
     pub(crate) rig: Rig,
     pub(crate) pose: HandPose,
     pub(crate) contacts: Vec<Contact>,
-    /// The surface of what is held.
     object: TriangleMesh,
 }
 
-/// A hand with angles in degrees (yaw and three pitches, thumb first) that holds a shape with the touching links.
-pub(crate) fn held(degrees: [[f32; 4]; 5], shape: Shape, touching: &[Touching]) -> Held {
-    let rig = Rig::clone(right());
-    let pose = hand_pose(
-        Pose::IDENTITY,
-        degrees.map(|[yaw, first, second, third]| {
-            angles([
-                yaw.to_radians(),
-                first.to_radians(),
-                second.to_radians(),
-                third.to_radians(),
-            ])
-        }),
-    );
+/// Yaw and three pitches of a digit in degrees.
+pub(crate) type Degrees = [i16; 4];
+
+/// A hand, thumb first, that holds a shape with the touching links.
+pub(crate) fn held(degrees: [Degrees; 5], shape: Shape, touching: &[Touching]) -> Held {
+    let digits = degrees.map(|digit| angles(digit.map(|angle| f32::from(angle).to_radians())));
     let mut held = Held {
-        rig,
-        pose,
+        rig: Rig::clone(right()),
+        pose: hand_pose(Pose::IDENTITY, digits),
         contacts: Vec::new(),
         object: shape.mesh(),
     };
@@ -127,33 +109,12 @@ impl Held {
         classify(&self.rig, &self.pose, &self.contacts, &shape)
     }
 
-    /// The mirror image, by the other hand.
-    pub(crate) fn mirrored(&self) -> Self {
-        let wrist = self.pose.frame_from_wrist.mirrored_x();
-        let mirror = Vec3::new(-1.0, 1.0, 1.0);
-        let mirrored = self.changed(self.rig.mirrored(), wrist, |point| point * mirror);
-        Self {
-            object: mirrored.with_object(|point| point, |[a, b, c]| [a, c, b]),
-            ..mirrored
-        }
-    }
-
-    /// Hand and object, scaled.
-    pub(crate) fn scaled(&self, factor: f32) -> Self {
-        let mut wrist = self.pose.frame_from_wrist;
-        wrist.position *= factor;
-        self.changed(self.rig.scaled(factor), wrist, |point| point * factor)
-    }
-
-    /// The grasp in another frame.
-    pub(crate) fn moved(&self, a_from_b: Pose) -> Self {
-        let wrist = a_from_b * self.pose.frame_from_wrist;
-        self.changed(self.rig.clone(), wrist, |point| a_from_b.transform_point(point))
-    }
-
-    /// The grasp with another hand, and its points elsewhere.
-    fn changed(&self, rig: Rig, wrist: Pose, point: impl Fn(Vec3) -> Vec3) -> Self {
-        let changed = |contact: &Contact| {
+    /// The mirror image, by the other hand, scaled and moved.
+    pub(crate) fn image(&self, scale: f32, a_from_b: Pose) -> Self {
+        let mut wrist = self.pose.frame_from_wrist.mirrored_x();
+        wrist.position *= scale;
+        let point = |point: Vec3| a_from_b.transform_point(point * Vec3::new(-scale, scale, scale));
+        let contacts = self.contacts.iter().map(|contact| {
             let position = point(contact.position);
             let normal = (point(contact.position + contact.normal) - position).normalize_or(Vec3::Z);
             Contact {
@@ -161,34 +122,25 @@ impl Held {
                 normal,
                 ..*contact
             }
-        };
+        });
+        let positions = self.object.positions().iter().copied().map(point);
+        let triangles = self.object.triangles().iter().map(|&[a, b, c]| [a, c, b]);
+        let object = TriangleMesh::new(positions.collect(), triangles.collect());
         Self {
-            rig,
-            pose: hand_pose(wrist, self.pose.digits),
-            contacts: self.contacts.iter().map(changed).collect(),
-            object: self.with_object(&point, |corners| corners),
+            rig: self.rig.mirrored().scaled(scale),
+            pose: hand_pose(a_from_b * wrist, self.pose.digits),
+            contacts: contacts.collect(),
+            object: object.expect("the mesh stays sound"),
         }
     }
 
-    fn with_object(
-        &self,
-        point: impl Fn(Vec3) -> Vec3,
-        corners: impl Fn([u32; 3]) -> [u32; 3],
-    ) -> TriangleMesh {
-        let positions = self.object.positions().iter().copied().map(point);
-        let triangles = self.object.triangles().iter().copied().map(corners);
-        TriangleMesh::new(positions.collect(), triangles.collect()).expect("the mesh stays sound")
-    }
-
-    /// Holds another shape with its palm.
     pub(crate) fn on_palm(mut self) -> Self {
         let below = Shape::Plate(Vec3::new(0.0, 80.0, 30.0), Vec3::Z, 16.0);
-        let palm = contact(below, self.rig.palm * 1e3, HandPart::Palm);
+        let palm = touch(below, self.rig.palm * 1e3, HandPart::Palm);
         self.contacts.push(palm);
         self
     }
 
-    /// Touches another shape with some links.
     pub(crate) fn also(mut self, shape: Shape, touching: &[Touching]) -> Self {
         self.touch(shape, touching);
         self
@@ -206,20 +158,15 @@ impl Held {
             .collect();
         let fitted = shape.fitted(&bones);
         for (&(digit, phalanx, _), &bone) in touching.iter().zip(&bones) {
-            self.contacts
-                .push(contact(fitted, bone, HandPart::Phalanx(digit, phalanx)));
+            let part = HandPart::Phalanx(digit, phalanx);
+            self.contacts.push(touch(fitted, bone, part));
         }
         fitted
     }
 }
 
 /// The contact of a shape with the flesh around a point.
-fn contact(shape: Shape, bone: Vec3, part: HandPart) -> Contact {
+fn touch(shape: Shape, bone: Vec3, part: HandPart) -> Contact {
     let (position, normal) = shape.nearest(bone);
-    Contact {
-        position: position * 1e-3,
-        normal,
-        triangle: 0,
-        part,
-    }
+    contact(position * 1e-3, normal, part)
 }

@@ -79,6 +79,11 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Check> {
             (seen.hangs, seen.classification)
         );
         assert!((kept.comfort - seen.comfort).abs() < 1e-4, "{what}");
+        let [a, b] = [&kept, seen].map(|grasp| grasp.margins.expect("it is physical"));
+        assert!(
+            (a.epsilon - b.epsilon).abs() + (a.residual - b.residual).abs() < 1e-4,
+            "{what}"
+        );
         assert!((score(&kept) - score(seen)).abs() < 1e-4, "{what}");
         return None;
     };
@@ -98,73 +103,46 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Check> {
 
 /// A pose near a hand's: a wrist moved by up to this many metres and radians, and angles changed by as many radians.
 fn perturbed(random: &mut Random, hand: &HandPose, by: f32) -> HandPose {
-    let Pose {
-        position,
-        orientation,
-    } = hand.frame_from_wrist;
+    let mut wrist = hand.frame_from_wrist;
     let turn = Quat::from_axis_angle(random.direction(), random.between(0.0, by));
+    wrist.position += random.direction() * random.between(0.0, 0.1 * by);
+    wrist.orientation = (turn * wrist.orientation).normalize();
     let limits = right().digits.map(|digit| digit.limits);
-    hand_pose(
-        Pose::new(
-            position + random.direction() * random.between(0.0, 0.1 * by),
-            (turn * orientation).normalize(),
-        ),
-        std::array::from_fn(|digit| {
-            let mut angles = hand.digits[digit];
-            for angle in [
-                &mut angles.base_yaw,
-                &mut angles.base_pitch,
-                &mut angles.second_pitch,
-                &mut angles.third_pitch,
-            ] {
-                *angle += random.between(-by, by);
-            }
-            limits[digit].clamped(angles)
-        }),
-    )
+    let near = |digit: usize| limits[digit].clamped(random.near_angles(hand.digits[digit], by));
+    hand_pose(wrist, std::array::from_fn(near))
 }
 
 /// The holdout with its giver moved toward the hand, or obstacles or an arm added around it.
 fn surrounded(random: &mut Random, holdout: &Holdout, hand: &HandPose) -> Holdout {
     let wrist = hand.frame_from_wrist.position;
     let mut holdout = holdout.clone();
-    let giver = holdout.presenting_hand.as_ref();
-    let giver = giver.and_then(|giver| giver.shape.joints()).cloned();
-    match random.index(6) {
-        0 => {
-            if let Some(joints) = giver {
-                let way = wrist - joints.joints[0].pose.position;
-                let moved = Pose::from_position(way * random.between(0.0, 0.5));
-                holdout.presenting_hand = Some(PresentingHand::of_joints(joints.transformed(moved)));
-            }
+    let giver = holdout
+        .presenting_hand
+        .as_ref()
+        .and_then(|giver| giver.shape.joints())
+        .cloned();
+    let mut near = |least: f32, most: f32| wrist + random.direction() * random.between(least, most);
+    let (place, shoulder) = (near(0.02, 0.15), near(0.3, 0.7));
+    match (random.index(6), giver) {
+        (0, Some(joints)) => {
+            let way = (wrist - joints.joints[0].pose.position) * random.between(0.0, 0.5);
+            let moved = joints.transformed(Pose::from_position(way));
+            holdout.presenting_hand = Some(PresentingHand::of_joints(moved));
         }
-        1 => {
-            let centre = wrist + random.direction() * random.between(0.02, 0.15);
-            let end = centre + random.direction() * 0.05;
-            let ball = TaperedCapsule::new(centre, end, 0.01, random.between(0.005, 0.02));
+        (1, _) => {
+            let end = place + random.direction() * 0.05;
+            let ball = TaperedCapsule::new(place, end, 0.01, random.between(0.005, 0.02));
             holdout.obstacles = vec![Obstacle::Capsule(ball)];
         }
-        2 => {
-            holdout.obstacles = vec![Obstacle::Box(oriented_box(
-                Pose::new(
-                    wrist + random.direction() * random.between(0.05, 0.3),
-                    random.rotation(),
-                ),
-                Vec3::new(0.1, 0.05, 0.02),
-            ))];
+        (2, _) => {
+            let half = Vec3::new(0.1, 0.05, 0.02);
+            let block = oriented_box(Pose::new(place, random.rotation()), half);
+            holdout.obstacles = vec![Obstacle::Box(block)];
         }
-        3 => {
-            holdout.stance = Stance::At(arm(
-                wrist + random.direction() * random.between(0.3, 0.7),
-                0.3,
-                0.26,
-            ));
-        }
-        4 => {
-            if let Some(joints) = giver {
-                let moved = Pose::from_position(random.direction() * 0.1);
-                holdout.other_hands = vec![HandShape::Joints(Box::new(joints.transformed(moved)))];
-            }
+        (3, _) => holdout.stance = Stance::At(arm(shoulder, 0.3, 0.26)),
+        (4, Some(joints)) => {
+            let moved = joints.transformed(Pose::from_position(random.direction() * 0.1));
+            holdout.other_hands = vec![HandShape::Joints(Box::new(moved))];
         }
         _ => {}
     }
@@ -286,6 +264,12 @@ fn what_hangs_falls_by_what_its_verdicts_say() {
         ..without_thumb()
     };
     assert_eq!(judged(no_hook), Some(Check::GraspType));
+    let upside_down = Holdout {
+        up: Vec3::NEG_Y,
+        ..holdout.clone()
+    };
+    let judged = guided(&upside_down).judge(&grasp.pose);
+    assert!(!judged.is_valid() && !judged.grasp.hangs && judged.grasp.score.is_none());
 }
 
 #[test]

@@ -7,7 +7,6 @@ use grasp_synthesis::search::current::{CurrentGraspVerdict, Grace, METRES_PER_RA
 
 use crate::prelude::*;
 
-/// A grasp to keep, with the hand at it.
 fn current(hand: HandPose) -> CurrentGrasp {
     CurrentGrasp {
         hand,
@@ -18,7 +17,6 @@ fn current(hand: HandPose) -> CurrentGrasp {
     }
 }
 
-/// A search after a current grasp.
 fn after<'a>(holdout: &'a Holdout, atlas: &Arc<Atlas>, current: CurrentGrasp) -> Search<'a> {
     guided(holdout).atlas(atlas).current(current)
 }

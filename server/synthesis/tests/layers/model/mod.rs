@@ -1,5 +1,0 @@
-//! Hands, objects, holdouts and requirements.
-
-mod hand;
-mod object;
-mod requirements;

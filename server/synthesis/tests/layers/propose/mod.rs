@@ -1,5 +1,0 @@
-//! Where hands are placed.
-
-mod handles;
-mod placements;
-mod transferred_grips;
