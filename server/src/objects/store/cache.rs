@@ -29,7 +29,6 @@ pub(crate) type SizeSlot = Arc<OnceLock<Arc<StoredObject>>>;
 /// Why something is derived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Need {
-    /// A call waits for it.
     Call,
     /// A call may ask for it soon, or an atlas grows from it.
     Ahead,
@@ -40,7 +39,6 @@ pub(crate) enum Need {
 enum Product {
     /// What searches need of it.
     Derived,
-    /// The object at another size.
     Size(ObjectSize, SizeSlot),
     /// The atlas for a hand, and what was learned.
     Atlas(Arc<Hand>),
@@ -118,8 +116,6 @@ impl Item {
 #[derive(Debug, Default)]
 pub(super) struct Cache {
     items: Vec<Item>,
-    /// The sum of their sizes.
-    bytes: usize,
 }
 
 impl Cache {
@@ -129,7 +125,6 @@ impl Cache {
     }
 
     fn add(&mut self, object: &Arc<StoredObject>, product: Product, bytes: usize, last_used: u64) {
-        self.bytes += bytes;
         self.items.push(Item {
             of: Arc::downgrade(object),
             product,
@@ -140,7 +135,6 @@ impl Cache {
 
     pub(super) fn retain(&mut self, stays: impl Fn(&Item) -> bool) {
         self.items.retain(stays);
-        self.bytes = self.items.iter().map(|item| item.bytes).sum();
     }
 
     /// Forgets what was made from an object that is changed or gone.
@@ -157,12 +151,9 @@ impl Cache {
             (a_atlas, a_used).cmp(&(b_atlas, b_used)).then(a.cmp(*b))
         });
         let Some((_, place)) = first else { return false };
-        let Item {
-            of, product, bytes, ..
-        } = self.items.remove(place);
-        self.bytes -= bytes;
-        if let Some(object) = of.upgrade() {
-            match product {
+        let item = self.items.remove(place);
+        if let Some(object) = item.of.upgrade() {
+            match item.product {
                 Product::Derived => object.derived.forget(),
                 Product::Size(..) => {}
                 Product::Atlas(hand) => {
@@ -222,9 +213,6 @@ impl ObjectStore {
 
     /// Makes room for so many more bytes and objects that a call needs: all that is not in use goes but the object with the id
     /// `kept`.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if what would have to make room is in use.
     fn make_room(
         &self,
         created: &mut Created,
@@ -282,9 +270,6 @@ impl ObjectStore {
     }
 
     /// Checks that a new object fits in the cache with what will be derived from it.
-    ///
-    /// # Errors
-    /// [`ServiceError::Invalid`].
     pub(crate) fn check_size(&self, object: &StoredObject) -> Result<(), ServiceError> {
         let whole = object.derived_and_own_bytes();
         if whole > self.limits.bytes {
@@ -324,7 +309,9 @@ impl ObjectStore {
         }
         let twin = self.created().derived_of_twin(object);
         let derived = match twin {
-            Some(twin) => object.share(&twin),
+            Some(twin) => object
+                .derived
+                .get_or_build(|| Ok(Arc::new(Derived::clone(&twin))))?,
             None => object.derived_until(stop)?,
         };
         let mut created = self.created();
@@ -375,16 +362,11 @@ impl ObjectStore {
     pub(crate) fn prepared(&self) -> usize {
         let created = self.created();
         let items = created.cache.items.iter();
-        items
-            .filter(|item| matches!(item.product, Product::Derived))
-            .count()
+        let derived = items.filter(|item| matches!(item.product, Product::Derived));
+        derived.count()
     }
 
     /// The place of an object at another size, which the caller fills if it is empty. It counts as that of the object itself.
-    ///
-    /// # Errors
-    /// - [`ServiceError::Invalid`] if both sizes are larger than the whole cache.
-    /// - [`ServiceError::Overloaded`] if what would have to be evicted is in use.
     pub(crate) fn resized(
         &self,
         stored: &Arc<StoredObject>,
@@ -470,7 +452,7 @@ impl ObjectStore {
 impl Created {
     /// Bytes of the cache in use.
     pub(super) fn taken(&self) -> usize {
-        self.bytes + self.cache.bytes
+        self.bytes + self.cache.items.iter().map(|item| item.bytes).sum::<usize>()
     }
 
     fn derived_of_twin(&self, object: &StoredObject) -> Option<Arc<Derived>> {

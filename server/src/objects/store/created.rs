@@ -18,7 +18,6 @@ use crate::{
 /// Number of evicted ids that are remembered for error messages.
 const REMEMBERED_EVICTIONS: usize = 1024;
 
-/// The created objects.
 #[derive(Debug, Default)]
 pub(super) struct Created {
     pub objects: BTreeMap<String, Entry>,
@@ -71,12 +70,11 @@ impl Created {
 
     pub(super) fn entry(&mut self, id: &str) -> Result<&mut Entry, ServiceError> {
         let evicted = &self.evicted;
-        self.objects
-            .get_mut(id)
-            .ok_or_else(|| ServiceError::ObjectNotFound {
-                name: name_of(id),
-                evicted: evicted.iter().any(|evicted| evicted == id),
-            })
+        let not_found = || ServiceError::ObjectNotFound {
+            name: name_of(id),
+            evicted: evicted.iter().any(|evicted| evicted == id),
+        };
+        self.objects.get_mut(id).ok_or_else(not_found)
     }
 
     /// The time of a use.
