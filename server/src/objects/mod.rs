@@ -36,24 +36,17 @@ use crate::{
     wire::{hex, wire_pose},
 };
 
-/// An object as the server keeps it.
 #[derive(Debug)]
 pub(crate) struct StoredObject {
-    /// The last part of its name.
     pub id: String,
-    /// True if it is part of the server.
     pub built_in: bool,
     pub object: PlainObject,
     /// SHA-256 of vertices, triangles and forbidden set, in hexadecimal.
     pub content_hash: String,
-    /// Oddities of its mesh.
     pub warnings: Vec<String>,
-    /// What is kept of its file.
     pub file: Arc<MeshFile>,
-    /// What its client knows of it.
     pub given: Given,
     pub atlas_slots: AtlasSlots,
-    /// What is derived from it.
     derived: DerivedCell,
     /// Cloned by every call that uses the object.
     uses: Arc<()>,
@@ -73,7 +66,6 @@ impl StoredObject {
         stored
     }
 
-    /// An object of a client.
     fn new(
         id: String,
         object: PlainObject,
@@ -114,7 +106,6 @@ impl StoredObject {
         Arc::clone(&self.uses)
     }
 
-    /// "objects/{object}".
     pub(crate) fn name(&self) -> String {
         name_of(&self.id)
     }
@@ -191,11 +182,8 @@ impl StoredObject {
 /// The state of an object that changes without its search structures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Record {
-    /// Labels that clients gave it.
     pub labels: Labels,
-    /// Identifies the state.
     pub etag: String,
-    /// When the object was created.
     pub created: SystemTime,
     /// When a client last changed it; not before `created`.
     pub updated: SystemTime,
@@ -205,14 +193,12 @@ pub(crate) struct Record {
 #[derive(Clone, Debug)]
 pub(crate) struct Revision {
     pub object: Arc<StoredObject>,
-    /// Its labels, etag and times.
     pub record: Arc<Record>,
 }
 
 /// An object or what is in memory of it.
 #[derive(Clone, Debug)]
 pub(crate) enum Body {
-    /// Ready for searches.
     Loaded(Arc<StoredObject>),
     /// Saved, and loaded when it is needed: the message that describes it, without labels, etag, times, regions and known grips.
     AtRest(Arc<v1::GraspObject>),
@@ -222,7 +208,6 @@ pub(crate) enum Body {
 #[derive(Clone, Debug)]
 pub(crate) struct Listed {
     pub body: Body,
-    /// Its labels, etag and times.
     pub record: Arc<Record>,
 }
 
@@ -255,7 +240,6 @@ impl Listed {
         }
     }
 
-    /// Its estimated size in bytes in the cache, without atlases.
     fn bytes(&self) -> usize {
         let Some(object) = self.object() else { return 0 };
         let labels = self.record.labels.iter();
@@ -263,7 +247,6 @@ impl Listed {
         object.bytes() + of_labels.sum::<usize>()
     }
 
-    /// Where the object is in lists.
     pub(crate) fn place(&self) -> Place {
         Place {
             created: nanoseconds(self.record.created),

@@ -26,7 +26,6 @@ pub(super) const KEPT_AHEAD: usize = 32;
 /// Where an object at another size is kept once it is prepared.
 pub(crate) type SizeSlot = Arc<OnceLock<Arc<StoredObject>>>;
 
-/// Why something is derived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Need {
     Call,
@@ -34,7 +33,6 @@ pub(crate) enum Need {
     Ahead,
 }
 
-/// What is made from an object.
 #[derive(Clone, Debug)]
 enum Product {
     /// What searches need of it.
@@ -55,7 +53,6 @@ impl Product {
     }
 }
 
-/// Something in the cache that can be made again.
 #[derive(Debug)]
 pub(super) struct Item {
     of: Weak<StoredObject>,
@@ -97,7 +94,6 @@ impl Item {
         }
     }
 
-    /// True if it makes room for something in this demand.
     fn yields_to(&self, demand: Demand) -> bool {
         match self.product {
             Product::Atlas(_) => self.demand().cmp(demand).is_lt(),
@@ -295,9 +291,8 @@ impl ObjectStore {
     /// there is room. An object that the server started with keeps it outside of the cache.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectUnloadable`] if it takes more than the whole cache.
-    /// - [`ServiceError::Overloaded`] if what would have to make room is in use.
-    /// - [`ServiceError::Cancelled`] if it was stopped.
+    /// [`ServiceError::ObjectUnloadable`] if it takes more than the whole cache, [`ServiceError::Overloaded`] if what would have to make
+    /// room is in use, [`ServiceError::Cancelled`].
     pub(crate) fn derived(
         &self,
         object: &Arc<StoredObject>,
@@ -450,7 +445,6 @@ impl ObjectStore {
 }
 
 impl Created {
-    /// Bytes of the cache in use.
     pub(super) fn taken(&self) -> usize {
         self.bytes + self.cache.items.iter().map(|item| item.bytes).sum::<usize>()
     }

@@ -23,7 +23,6 @@ pub(super) struct Created {
     pub objects: BTreeMap<String, Entry>,
     /// Ids of objects by the ids of the requests that created them.
     pub requests: HashMap<Uuid, String>,
-    /// What can be made from objects again.
     pub cache: Cache,
     /// Number of objects that are not at rest, and of those about to be added.
     pub loaded: usize,
@@ -37,11 +36,9 @@ pub(super) struct Created {
     /// Number of etags that it made.
     etags: u64,
     pub watchers: Vec<Weak<Watcher>>,
-    /// The objects that are being loaded.
     pub loads: Vec<Load>,
 }
 
-/// A created object.
 #[derive(Debug)]
 pub(super) struct Entry {
     pub state: Listed,
@@ -54,7 +51,6 @@ pub(super) struct Entry {
 }
 
 impl Created {
-    /// None yet; the server starts now.
     pub(super) fn new(now: SystemTime) -> Self {
         Self {
             started: now.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos(),
@@ -77,7 +73,6 @@ impl Created {
         self.objects.get_mut(id).ok_or_else(not_found)
     }
 
-    /// The time of a use.
     pub(super) fn tick(&mut self) -> u64 {
         self.uses += 1;
         self.uses
@@ -111,7 +106,6 @@ impl Created {
         Ok(entry)
     }
 
-    /// Adds an object that was not there.
     pub(super) fn add(&mut self, entry: Entry) {
         let id = entry.state.id().to_owned();
         self.count(&entry.state);

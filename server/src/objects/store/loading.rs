@@ -87,7 +87,6 @@ impl ObjectStore {
         .await
     }
 
-    /// What its client gives an object at rest.
     pub(crate) async fn saved_given(self: &Arc<Self>, id: &str) -> Result<v1::GraspObject, ServiceError> {
         Ok(self.whole_record(id).await?.given())
     }
@@ -142,10 +141,8 @@ impl ObjectStore {
     /// The object with this id, loaded if necessary. It is not evicted while its `object` is held.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectNotFound`].
-    /// - [`ServiceError::ObjectDamaged`], [`ServiceError::ObjectUnloadable`] and [`ServiceError::StoreFailed`] if it
-    ///   cannot be loaded.
-    /// - [`ServiceError::Overloaded`] if the objects that would have to be evicted are in use.
+    /// [`ServiceError::ObjectNotFound`]; [`ServiceError::ObjectDamaged`], [`ServiceError::ObjectUnloadable`] and
+    /// [`ServiceError::StoreFailed`] if it cannot be loaded; [`ServiceError::Overloaded`] if what would have to make room is in use.
     pub(crate) async fn loaded(self: &Arc<Self>, id: &str) -> Result<Revision, ServiceError> {
         loop {
             let loaded = match self.get(id)?.loaded() {

@@ -45,8 +45,6 @@ use crate::{
 /// When to retry if every object in the full cache is in use: searches end within seconds.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
-/// All objects.
-///
 /// If objects are saved, the methods that add, change or delete one wait for the disk or network. They are for threads that
 /// may block, in the context of the async runtime.
 #[derive(Debug)]
@@ -71,7 +69,6 @@ pub(crate) struct Origin {
     pub mesh: Bytes,
 }
 
-/// True if a built-in object has this id.
 pub(crate) fn is_built_in(id: &str) -> bool {
     object(id).is_some()
 }
@@ -103,12 +100,10 @@ impl ObjectStore {
         }
     }
 
-    /// The objects that the server started with.
     pub(crate) fn pinned(&self) -> impl Iterator<Item = &Arc<StoredObject>> {
         self.pinned.values().filter_map(Listed::object)
     }
 
-    /// True if an object has this id.
     pub(crate) fn contains(&self, id: &str) -> bool {
         self.pinned.contains_key(id) || self.created().objects.contains_key(id)
     }
@@ -162,11 +157,8 @@ impl ObjectStore {
     /// that the other created.
     ///
     /// # Errors
-    /// - Those of [`Self::repeated`].
-    /// - [`ServiceError::Invalid`] if it is larger than the whole cache.
-    /// - [`ServiceError::Overloaded`] if the objects that would have to be evicted are in use.
-    /// - [`ServiceError::ObjectsFull`] if as many objects are saved as may be.
-    /// - [`ServiceError::StoreFailed`] if it cannot be saved.
+    /// Those of [`Self::repeated`], [`ServiceError::Invalid`] if it is larger than the whole cache, [`ServiceError::Overloaded`] if
+    /// what would have to make room is in use, [`ServiceError::ObjectsFull`], and [`ServiceError::StoreFailed`].
     pub(crate) fn insert(&self, object: StoredObject, origin: Origin) -> Result<Listed, ServiceError> {
         let mut mesh_uses = self.changing();
         let reserved;
@@ -227,7 +219,6 @@ impl ObjectStore {
         Ok(Some(hash))
     }
 
-    /// The ids of all created objects.
     fn ids(&self) -> Vec<String> {
         self.created().objects.keys().cloned().collect()
     }
@@ -249,10 +240,8 @@ impl ObjectStore {
     /// The object with this id if a client may change it and it has the given etag.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectNotFound`].
-    /// - [`ServiceError::ObjectReadOnly`] if the server started with it.
-    /// - [`ServiceError::ObjectChanged`] if the etag is another one.
-    /// - [`ServiceError::ObjectDamaged`] if its record could not be read.
+    /// [`ServiceError::ObjectNotFound`], [`ServiceError::ObjectReadOnly`] if the server started with it,
+    /// [`ServiceError::ObjectChanged`] if the etag is another one, [`ServiceError::ObjectDamaged`].
     pub(crate) fn changeable(&self, id: &str, etag: Option<&str>) -> Result<Listed, ServiceError> {
         self.check_changeable(id)?;
         let mut created = self.created();
@@ -264,10 +253,7 @@ impl ObjectStore {
     /// room if necessary.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectNotFound`] if it was deleted or evicted meanwhile.
-    /// - [`ServiceError::ObjectChanged`] if it was changed meanwhile.
-    /// - [`ServiceError::ObjectDamaged`] if what was saved of it is damaged.
-    /// - The errors of [`Self::insert`] about room and saving.
+    /// Those of [`Self::changeable`] if it was deleted, evicted or changed meanwhile, and those of [`Self::insert`] about room and saving.
     pub(crate) fn replace(
         &self,
         base: &Listed,
@@ -306,7 +292,6 @@ impl ObjectStore {
         Ok(after)
     }
 
-    /// Saves a change if objects are saved.
     fn save_change(
         &self,
         id: &str,
@@ -329,7 +314,6 @@ impl ObjectStore {
         })
     }
 
-    /// Deletes an object.
     pub(crate) fn remove(&self, id: &str, etag: Option<&str>) -> Result<(), ServiceError> {
         self.check_changeable(id)?;
         let mut mesh_uses = self.changing();
