@@ -71,10 +71,9 @@ pub(crate) fn glb_pieces(object: &Arc<StoredObject>) -> impl Iterator<Item = Vec
         .chain([json_end.concat()])
         .chain(positions)
         .chain(triangles.into_iter().flatten())
-        .filter(move |piece: &Vec<u8>| {
-            let _held = &held;
-            !piece.is_empty()
-        })
+        .filter(|piece| !piece.is_empty())
+        .zip(iter::repeat(held))
+        .map(|(piece, _)| piece)
 }
 
 /// What `part` makes of `count` elements of an object, from each [`PER_PIECE`]th on.
@@ -164,8 +163,7 @@ fn runs_from(object: &PlainObject, from: usize) -> Vec<u8> {
     let all = count(object.mesh.triangles().len());
     let is_forbidden = |&triangle: &u32| object.is_forbidden(triangle);
     let begins = |&first: &u32| is_forbidden(&first) && (first == 0 || !is_forbidden(&(first - 1)));
-    let mut text = String::new();
-    for first in (count(from)..all).take(PER_PIECE).filter(begins) {
+    let runs = (count(from)..all).take(PER_PIECE).filter(begins).map(|first| {
         let length = (first..all).take_while(is_forbidden).count();
         let mut later = first + count(length)..all;
         let comma = if later.any(|triangle| is_forbidden(&triangle)) {
@@ -173,9 +171,9 @@ fn runs_from(object: &PlainObject, from: usize) -> Vec<u8> {
         } else {
             ""
         };
-        text += &format!("[{first},{length}]{comma}");
-    }
-    text.into_bytes()
+        format!("[{first},{length}]{comma}")
+    });
+    runs.collect::<String>().into_bytes()
 }
 
 #[cfg(test)]

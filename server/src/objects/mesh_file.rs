@@ -100,12 +100,11 @@ impl MeshFile {
             let known = self
                 .groups
                 .binary_search_by(|group| (*group.name).cmp(name.as_str()));
-            match known {
-                Ok(group) => named.extend(self.groups[group].triangles.iter().cloned().flatten()),
-                Err(_) => {
-                    let field = field.child("groups").at(place);
-                    field.add(format_args!("is {}; {}", quoted(name), self.known_groups()));
-                }
+            if let Ok(group) = known {
+                named.extend(self.groups[group].triangles.iter().cloned().flatten());
+            } else {
+                let field = field.child("groups").at(place);
+                field.add(format_args!("is {}; {}", quoted(name), self.known_groups()));
             }
         }
         for (place, &triangle) in triangles.iter().enumerate() {
