@@ -54,7 +54,6 @@ pub(crate) enum BuildState {
     Absent,
     /// In the build queue, or being built.
     Growing,
-    /// Complete.
     Finished,
     /// Nothing is added, because others in more demand take all the memory.
     NoRoom,
@@ -65,7 +64,6 @@ pub(crate) enum BuildState {
 /// One hand's atlas.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Slot {
-    /// State of the build.
     pub state: BuildState,
     /// The grips that requests are answered from, and from which growth resumes.
     pub grown: Option<Arc<Grown>>,
@@ -73,7 +71,6 @@ pub(crate) struct Slot {
     pub learned: Arc<Atlas>,
     /// How long this process has worked on the atlas.
     pub build_time: Duration,
-    /// The demand for it.
     pub demand: Demand,
 }
 
@@ -120,13 +117,9 @@ impl AtlasSlots {
     pub(crate) fn request(&self, hand: &Arc<Hand>, at: Duration) -> bool {
         let mut slots = self.lock();
         if slots.len() >= MAX_HANDS && slots.iter().all(|(other, _)| other != hand) {
-            let least = slots
-                .iter()
-                .enumerate()
-                .min_by(|(_, (_, a)), (_, (_, b))| a.demand.cmp(b.demand));
-            if let Some((place, _)) = least {
-                slots.swap_remove(place);
-            }
+            let demand = |place: &usize| slots[*place].1.demand;
+            let least = (0..slots.len()).min_by(|a, b| demand(a).cmp(demand(b)));
+            let _ = least.map(|place| slots.swap_remove(place));
         }
         drop(slots);
         self.with(hand, |slot| {
@@ -148,7 +141,6 @@ impl AtlasSlots {
         });
     }
 
-    /// Copies of all slots with their hands.
     pub(crate) fn all(&self) -> Vec<(Arc<Hand>, Slot)> {
         self.lock().clone()
     }
@@ -211,7 +203,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn drops_the_hand_asked_for_least() {
+    fn drops_the_hand_in_least_demand() {
         let adult = hand("adult", Handedness::Right).expect("the rig is built in");
         let hands: Vec<Arc<Hand>> = (0..=MAX_HANDS)
             .map(|size| {

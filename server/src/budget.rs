@@ -108,7 +108,6 @@ impl DeadlineReserve {
         self.level.fetch_max(level.to_bits(), Ordering::Relaxed);
     }
 
-    /// The reserve at a time.
     pub(crate) fn at(&self, time: Instant) -> Duration {
         let level = f64::from_bits(self.level.load(Ordering::Relaxed));
         // A delay recorded by another thread may be of a later time than this: it must not exceed the longest either.

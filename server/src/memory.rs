@@ -76,10 +76,9 @@ fn resource_limits(text: &str) -> Vec<MemoryLimit> {
     ];
     let limit = |(title, name): (&str, &str)| {
         let line = text.lines().find_map(|line| line.strip_prefix(title))?;
-        Some(MemoryLimit {
-            bytes: line.split_whitespace().next()?.parse().ok()?,
-            source: name.to_owned(),
-        })
+        let bytes = line.split_whitespace().next()?.parse().ok()?;
+        let source = name.to_owned();
+        Some(MemoryLimit { bytes, source })
     };
     limits.into_iter().filter_map(limit).collect()
 }
@@ -104,10 +103,9 @@ fn cgroup_limits(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Vec<Me
         for group in Path::new(group.trim_start_matches('/')).ancestors() {
             let file = Path::new(mount).join(group).join(name);
             let bytes = read(&file).and_then(|text| text.trim().parse().ok());
-            limits.extend(bytes.filter(|&bytes| bytes < UNLIMITED).map(|bytes| MemoryLimit {
-                bytes,
-                source: file.display().to_string(),
-            }));
+            let source = file.display().to_string();
+            let limit = bytes.filter(|&bytes| bytes < UNLIMITED);
+            limits.extend(limit.map(|bytes| MemoryLimit { bytes, source }));
         }
     }
     limits

@@ -207,7 +207,7 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
-            resizer: Resizer::new(Arc::clone(&builds.free)),
+            resizer: Resizer(Arc::clone(&builds.free)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,

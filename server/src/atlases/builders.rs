@@ -32,39 +32,19 @@ const NICENESS: i32 = 19;
 /// What the builder threads share.
 #[derive(Debug)]
 pub(super) struct Builders {
-    /// The atlases to build.
     pub queue: BuildQueue,
     /// The objects, in whose cache atlases are.
     pub objects: Arc<ObjectStore>,
     pub executor: SearchExecutor,
     pub files: Option<AtlasFiles>,
-    default_rig: String,
+    pub default_rig: String,
     /// Number of threads that grow atlases.
-    threads: usize,
+    pub threads: usize,
     /// The start of the clock of demands.
-    started: Instant,
+    pub started: Instant,
 }
 
 impl Builders {
-    /// Builders whose `threads` are yet to be started.
-    pub(super) fn new(
-        threads: usize,
-        objects: Arc<ObjectStore>,
-        executor: SearchExecutor,
-        files: Option<AtlasFiles>,
-        default_rig: String,
-    ) -> Self {
-        Self {
-            queue: BuildQueue::default(),
-            objects,
-            executor,
-            files,
-            default_rig,
-            threads,
-            started: Instant::now(),
-        }
-    }
-
     /// True if there are threads and they were not stopped.
     pub(super) fn are_running(&self) -> bool {
         !self.queue.is_stopped() && self.threads > 0
@@ -75,9 +55,10 @@ impl Builders {
     pub(super) fn prepared(&self, object: &Arc<StoredObject>) -> Option<Arc<PreparedObject>> {
         let is_stopped = || self.queue.is_stopped();
         let derived = self.objects.derived(object, Need::Ahead, Stop::when(&is_stopped));
-        let derived =
-            derived.inspect_err(|error| tracing::debug!(object = object.name(), %error, "no atlas grows"));
-        Some(Arc::clone(&derived.ok()?.object))
+        derived
+            .inspect_err(|error| tracing::debug!(object = object.name(), %error, "no atlas grows"))
+            .ok()
+            .map(|derived| Arc::clone(&derived.object))
     }
 
     /// Puts an atlas in its slot; `spent` is the work done on it since the last time. False if there is no room.
@@ -94,7 +75,6 @@ impl Builders {
         })
     }
 
-    /// A hand of the default rig.
     pub(super) fn default_hand(&self, handedness: Handedness) -> Option<&'static Arc<Hand>> {
         hand(&self.default_rig, handedness)
     }
@@ -116,9 +96,6 @@ impl Builders {
 
 /// Starts a thread that grows atlases, or one that reads them at the priority of other threads: reading takes a millisecond, and
 /// requests wait for what was dropped from memory.
-///
-/// # Errors
-/// The thread cannot be started.
 pub(super) fn start_thread(builders: &Arc<Builders>, name: String, grows: bool) -> std::io::Result<()> {
     let builders = Arc::clone(builders);
     let thread = thread::Builder::new().name(name).spawn(move || {
@@ -155,12 +132,10 @@ pub(super) enum Stage {
     Completing,
 }
 
-/// An atlas to build.
 #[derive(Debug)]
 pub(super) struct BuildJob {
     /// The object; gone once it was evicted.
     pub object: Weak<StoredObject>,
-    /// The hand that holds it.
     pub hand: Arc<Hand>,
     /// What comes next.
     pub stage: Stage,
@@ -186,7 +161,6 @@ pub(super) struct BuildQueue {
 }
 
 impl BuildQueue {
-    /// Adds a job.
     pub(super) fn push(&self, job: BuildJob) {
         self.jobs().push_back(job);
         // Not each waits for jobs of any stage.
@@ -212,12 +186,9 @@ impl BuildQueue {
     pub(super) fn next_before(&self, other: &BuildJob) -> Option<BuildJob> {
         let worth = other.worth()?;
         let mut jobs = self.jobs();
-        let (place, first) = first(&mut jobs, |job| job.stage == Stage::Starting)?;
-        if first.cmp(worth).is_gt() {
-            jobs.remove(place)
-        } else {
-            None
-        }
+        let first = first(&mut jobs, |job| job.stage == Stage::Starting);
+        let (place, _) = first.filter(|(_, first)| first.cmp(worth).is_gt())?;
+        jobs.remove(place)
     }
 
     /// Ends every wait for a job, now and later.
@@ -244,9 +215,7 @@ fn first(jobs: &mut VecDeque<BuildJob>, counts: impl Fn(&BuildJob) -> bool) -> O
     let mut first: Option<(usize, Demand)> = None;
     let mut place = 0;
     jobs.retain(|job| {
-        let Some(worth) = job.worth() else {
-            return false;
-        };
+        let Some(worth) = job.worth() else { return false };
         if counts(job) && first.is_none_or(|(_, best)| worth.cmp(best).is_gt()) {
             first = Some((place, worth));
         }
@@ -260,15 +229,8 @@ fn first(jobs: &mut VecDeque<BuildJob>, counts: impl Fn(&BuildJob) -> bool) -> O
 mod tests {
     use std::time::Duration;
 
-    use grasp_assets::hands::hand;
-    use grasp_synthesis::model::hand::Handedness;
-
     use super::*;
-    use crate::objects::tests::tetrahedron;
-
-    fn adult() -> &'static Arc<Hand> {
-        hand("adult", Handedness::Right).expect("it is built in")
-    }
+    use crate::{atlases::tests::adult, objects::tests::tetrahedron};
 
     /// An object that was requested so often.
     fn asked_for(id: &str, calls: usize) -> Arc<StoredObject> {
@@ -292,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn serves_what_is_asked_for_most_and_useful_slices_before_completions() {
+    fn serves_what_is_in_most_demand_and_useful_slices_before_completions() {
         let queue = BuildQueue::default();
         let calls = [
             ("once", 1),

@@ -53,9 +53,6 @@ pub(crate) struct AtlasFiles {
 impl AtlasFiles {
     /// Opens the folder, creating it if necessary, and removes unfinished files that a crash left in it. If `is_private`, it and its
     /// files are this user's only.
-    ///
-    /// # Errors
-    /// The folder cannot be created.
     pub(crate) fn open(folder: PathBuf, is_private: bool) -> io::Result<Self> {
         if is_private {
             create_private(&folder)?;
@@ -95,17 +92,13 @@ impl AtlasFiles {
         hand: &Hand,
     ) -> Option<Grown> {
         let path = self.path(object, hand);
-        let read = read_bounded(&path).and_then(|bytes| {
-            decode(&bytes, prepared, &hand.rig)
-                .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
-        });
+        let read = read_bounded(&path)
+            .and_then(|bytes| decode(&bytes, prepared, &hand.rig).map_err(io::Error::other));
         match read {
             Ok(grown) => {
                 // Marks the file as used. A read-only folder still serves atlases.
-                let _ = File::options()
-                    .append(true)
-                    .open(&path)
-                    .and_then(|file| file.set_modified(SystemTime::now()));
+                let file = File::options().append(true).open(&path);
+                let _ = file.and_then(|file| file.set_modified(SystemTime::now()));
                 Some(grown)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
@@ -155,16 +148,14 @@ impl AtlasFiles {
         let mut taken = 0;
         for file in fs::read_dir(&self.folder)? {
             let path = file?.path();
-            let is_finished = path.extension().is_some_and(|extension| extension == EXTENSION);
-            if !is_finished && !is_part_file(&path) {
-                continue;
-            }
             let Ok(about) = fs::metadata(&path) else {
                 continue;
             };
-            taken += about.len();
-            if is_finished {
+            if path.extension().is_some_and(|extension| extension == EXTENSION) {
+                taken += about.len();
                 finished.push((about.modified()?, about.len(), path));
+            } else if is_part_file(&path) {
+                taken += about.len();
             }
         }
         finished.sort_unstable();
@@ -195,43 +186,38 @@ fn part_of(path: &Path) -> PathBuf {
 
 /// True for a name that [`part_of`] gives.
 fn is_part_file(path: &Path) -> bool {
-    let name = path.file_name().and_then(|name| name.to_str());
-    let parts = name.and_then(|name| {
+    let is_part = |name: &str| {
         let (key, rest) = name.split_once('.')?;
         let (process, number) = rest.strip_suffix(".part")?.split_once('-')?;
-        Some((key, [process, number]))
-    });
-    parts.is_some_and(|(key, numbers)| {
-        key.len() == KEY_DIGITS
-            && key.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
-            && numbers.iter().all(|number| number.parse::<u64>().is_ok())
-    })
+        let is_key =
+            key.len() == KEY_DIGITS && key.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
+        let are_numbers = [process, number]
+            .iter()
+            .all(|number| number.parse::<u64>().is_ok());
+        Some(is_key && are_numbers)
+    };
+    let name = path.file_name().and_then(|name| name.to_str());
+    name.and_then(is_part) == Some(true)
 }
 
 /// Removes the unfinished files of earlier processes, and logs how many there were.
-///
-/// # Errors
-/// The folder cannot be listed, or a file cannot be removed; other files are removed nonetheless.
 fn remove_unfinished(folder: &Path) -> io::Result<()> {
-    let (mut files, mut bytes, mut failed) = (0_usize, 0, Ok(()));
+    let (mut files, mut failed) = (0, Ok(()));
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         // A process id says nothing: in a container, it is the same after every restart.
-        let about = fs::symlink_metadata(&path).ok();
-        let Some(about) = about.filter(|about| about.is_file() && is_part_file(&path)) else {
+        let is_file = fs::symlink_metadata(&path).is_ok_and(|about| about.is_file());
+        if !is_file || !is_part_file(&path) {
             continue;
-        };
+        }
         match fs::remove_file(&path) {
-            Ok(()) => {
-                files += 1;
-                bytes += about.len();
-            }
+            Ok(()) => files += 1,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(error) => failed = Err(error),
         }
     }
     if files > 0 {
-        tracing::info!(folder = %folder.display(), files, bytes, "removed unfinished atlas files");
+        tracing::info!(folder = %folder.display(), files, "removed unfinished atlas files");
     }
     failed
 }
@@ -241,10 +227,7 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(MAX_FILE + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > MAX_FILE {
-        return Err(io::Error::new(
-            io::ErrorKind::InvalidData,
-            format!("it has more than {MAX_FILE} bytes"),
-        ));
+        return Err(io::Error::other(format!("it has more than {MAX_FILE} bytes")));
     }
     Ok(bytes)
 }
@@ -296,49 +279,29 @@ mod tests {
     }
 
     #[test]
-    fn evicts_least_recently_used_files() {
+    fn evicts_least_recently_used_files_and_counts_unfinished_ones() {
         let folder = Folder::new("room");
         let objects = [0.02, 0.021, 0.022].map(|x| cuboid("any", Vec3::new(x, 0.015, 0.05)));
-        let grown = objects.each_ref().map(grown);
-        let files = folder.open();
-        files.write(&objects[0], &prepared(&objects[0]), adult(), &grown[0]);
-        let files = files.bounded(5 * folder.bytes() / 2);
-        pause();
-        files.write(&objects[1], &prepared(&objects[1]), adult(), &grown[1]);
-        pause();
-        let is_there = |place: usize| {
-            files
-                .read(&objects[place], &prepared(&objects[place]), adult())
-                .is_some()
+        let prepared = objects.each_ref().map(prepared);
+        let write = |files: &AtlasFiles, place: usize| {
+            pause();
+            let (object, grown) = (&objects[place], grown(&objects[place]));
+            files.write(object, &prepared[place], adult(), &grown);
         };
-        assert!(is_there(0));
-        pause();
-        files.write(&objects[2], &prepared(&objects[2]), adult(), &grown[2]);
-        assert_eq!([0, 1, 2].map(is_there), [true, false, true]);
-    }
-
-    #[test]
-    fn unfinished_files_count_to_the_bound() {
-        let folder = Folder::new("part-bound");
-        let objects = [0.02, 0.021].map(|x| cuboid("any", Vec3::new(x, 0.015, 0.05)));
-        let grown = objects.each_ref().map(grown);
         let files = folder.open();
-        files.write(&objects[0], &prepared(&objects[0]), adult(), &grown[0]);
+        write(&files, 0);
         let bytes = folder.bytes();
         let files = files.bounded(5 * bytes / 2);
-        fs::write(
-            folder.0.join(format!("{KEY}.7-0.part")),
-            vec![0_u8; bytes as usize],
-        )
-        .unwrap();
+        let is_there = |place: usize| files.read(&objects[place], &prepared[place], adult()).is_some();
+        write(&files, 1);
         pause();
-        files.write(&objects[1], &prepared(&objects[1]), adult(), &grown[1]);
-        let is_there = |place: usize| {
-            files
-                .read(&objects[place], &prepared(&objects[place]), adult())
-                .is_some()
-        };
-        assert_eq!([0, 1].map(is_there), [false, true]);
+        assert!(is_there(0));
+        write(&files, 2);
+        assert_eq!([0, 1, 2].map(is_there), [true, false, true]);
+        let unfinished = folder.0.join(format!("{KEY}.7-0.part"));
+        fs::write(unfinished, vec![0_u8; bytes as usize]).unwrap();
+        write(&files, 1);
+        assert_eq!([0, 1, 2].map(is_there), [false, true, false]);
     }
 
     #[test]

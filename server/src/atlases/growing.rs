@@ -53,7 +53,7 @@ const PAUSE_CHECK: Duration = Duration::from_millis(1);
 
 /// How a turn ended.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Turn {
+enum Turn {
     /// The atlas can still grow.
     Next(Stage),
     /// The atlas does not grow.
@@ -87,18 +87,17 @@ pub(super) fn work(builders: &Builders, job: BuildJob) {
     }
     let after = object.atlas_slots.get(&hand).unwrap_or_default();
     let became = |is: fn(&Slot) -> bool| is(&after) && !is(&before);
+    let objects = &builders.objects;
     if became(|slot| slot.entries() >= USEFUL) {
-        builders.objects.tell_of_atlas(&object, Event::AtlasUseful(side));
+        objects.tell_of_atlas(&object, Event::AtlasUseful(side));
     }
     if became(|slot| slot.state == BuildState::Finished) {
-        builders
-            .objects
-            .tell_of_atlas(&object, Event::AtlasComplete(side));
+        objects.tell_of_atlas(&object, Event::AtlasComplete(side));
     }
 }
 
 /// Reads an atlas or grows it by a stage, and publishes it.
-pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
+fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
     // Without a slot, other hands have taken its place.
     let Some(slot) = object.atlas_slots.get(&job.hand) else {
         return Turn::Dropped;
@@ -110,13 +109,10 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
     if job.stage == Stage::Unread {
         return read_turn(builders, object, &job.hand);
     }
-    if !builders
-        .objects
-        .has_room_for_atlas(object, &job.hand, EXPECTED_BYTES)
-    {
-        return Turn::Ended(BuildState::NoRoom);
-    }
-    let Some(prepared) = builders.prepared(object) else {
+    let objects = &builders.objects;
+    let has_room = objects.has_room_for_atlas(object, &job.hand, EXPECTED_BYTES);
+    let prepared = has_room.then(|| builders.prepared(object)).flatten();
+    let Some(prepared) = prepared else {
         return Turn::Ended(BuildState::NoRoom);
     };
     let plan = Plan::of(&prepared, &job.hand);
@@ -280,15 +276,14 @@ fn log_progress(object: &StoredObject, hand: &Arc<Hand>, before: &Slot) {
 /// On a symmetric object, what one hand can do, the other can. The left hand's grips are therefore the mirror images of the right
 /// hand's: mirrored holdouts have mirrored answers, and both hands share a file.
 #[derive(Debug)]
-pub(super) struct Plan {
-    /// The hand that grows.
-    pub(super) grows: Arc<Hand>,
+struct Plan {
+    grows: Arc<Hand>,
     mirror: Option<Mirror>,
 }
 
 impl Plan {
     /// The plan for a hand's atlas of an object.
-    pub(super) fn of(object: &PreparedObject, of: &Arc<Hand>) -> Self {
+    fn of(object: &PreparedObject, of: &Arc<Hand>) -> Self {
         let right = right_of(of);
         let mirror = right.and_then(|_| Mirror::of_symmetric(object));
         Self {
@@ -298,7 +293,7 @@ impl Plan {
     }
 
     /// What has grown as an atlas of the hand.
-    pub(super) fn placed(&self, grown: Grown, object: &PreparedObject, of: &Hand) -> Grown {
+    fn placed(&self, grown: Grown, object: &PreparedObject, of: &Hand) -> Grown {
         match self.mirror {
             Some(mirror) => grown.mirrored(mirror, object.object(), &of.rig),
             None => grown,
@@ -314,13 +309,10 @@ fn right_of(left: &Hand) -> Option<&'static Arc<Hand>> {
 }
 
 /// Publishes the atlas on disk or the shipped grips, if there are any.
-pub(super) fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Turn {
+fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Turn {
     let start = thread_time();
-    let on_disk = || read_file(builders, object, hand);
-    let Some(read) = shipped_grips(builders, object, hand)
-        .or_else(on_disk)
-        .map(Arc::new)
-    else {
+    let read = shipped_grips(builders, object, hand).or_else(|| read_file(builders, object, hand));
+    let Some(read) = read.map(Arc::new) else {
         return Turn::Next(Stage::Starting);
     };
     let entries = read.atlas.entries().len();
@@ -365,12 +357,7 @@ fn shipped_grips(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Han
     match decode(bytes, &prepared, &hand.rig) {
         Ok(grown) => Some(grown.completed()),
         Err(error) => {
-            tracing::warn!(
-                object = object.name(),
-                hand = %hand_label(hand),
-                %error,
-                "cannot read the shipped grips"
-            );
+            tracing::warn!(object = object.name(), hand = %hand_label(hand), %error, "cannot read the shipped grips");
             None
         }
     }

@@ -17,7 +17,7 @@ mod growing;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
@@ -27,7 +27,7 @@ use grasp_synthesis::{
 };
 
 use self::{
-    builders::{Builders, start_thread},
+    builders::{BuildQueue, Builders, start_thread},
     files::AtlasFiles,
 };
 use crate::{
@@ -57,22 +57,9 @@ impl KnownGrips {
     }
 }
 
-/// Stops the builders when it is dropped.
-#[derive(Debug)]
-pub(crate) struct StopBuilders(Arc<Builders>);
-
-impl Drop for StopBuilders {
-    fn drop(&mut self) {
-        self.0.queue.stop();
-    }
-}
-
 impl Atlases {
     /// Starts `threads` builders for the objects of a store, which slow down while `executor` searches. With 0 threads
     /// there are no atlases.
-    ///
-    /// # Errors
-    /// The threads cannot be started.
     pub(crate) fn start(
         threads: usize,
         objects: &Arc<ObjectStore>,
@@ -80,8 +67,15 @@ impl Atlases {
         files: Option<AtlasFiles>,
         default_rig: String,
     ) -> std::io::Result<Self> {
-        let builders = Builders::new(threads, Arc::clone(objects), executor, files, default_rig);
-        let builders = Arc::new(builders);
+        let builders = Arc::new(Builders {
+            queue: BuildQueue::default(),
+            objects: Arc::clone(objects),
+            executor,
+            files,
+            default_rig,
+            threads,
+            started: Instant::now(),
+        });
         let atlases = Self(Arc::clone(&builders));
         for number in 0..threads {
             start_thread(&builders, format!("grasp-atlas-{number}"), true)?;
@@ -121,9 +115,8 @@ impl Atlases {
         }
         self.0.request(object, hands);
         hands.map(|hand| {
-            let slot = hand
-                .and_then(|hand| object.atlas_slots.get(hand))
-                .unwrap_or_default();
+            let slot = hand.and_then(|hand| object.atlas_slots.get(hand));
+            let slot = slot.unwrap_or_default();
             let grown = slot.grown.filter(|grown| !grown.atlas.entries().is_empty());
             KnownGrips {
                 atlas: grown.map(|grown| Arc::clone(&grown.atlas)),
@@ -158,9 +151,9 @@ impl Atlases {
         }
     }
 
-    /// A guard that stops the builders.
-    pub(crate) fn stopper(&self) -> StopBuilders {
-        StopBuilders(Arc::clone(&self.0))
+    /// A guard that stops the builders, too.
+    pub(crate) fn stopper(&self) -> Self {
+        Self(Arc::clone(&self.0))
     }
 }
 

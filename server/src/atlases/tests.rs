@@ -19,11 +19,7 @@ use grasp_synthesis::{
     propose::prepared::PreparedObject,
 };
 
-use super::{
-    builders::{BuildJob, Stage},
-    growing::{Turn, turn},
-    *,
-};
+use super::*;
 use crate::{limits::StoreLimits, objects::store::Origin};
 
 /// Longest wait for any event; reached only if something hangs.
@@ -47,6 +43,14 @@ pub(super) fn adult() -> &'static Arc<Hand> {
 pub(super) fn prepared(object: &StoredObject) -> Arc<PreparedObject> {
     let derived = unstopped(|stop| object.derived_until(stop));
     Arc::clone(&derived.object)
+}
+
+fn slot_of(object: &StoredObject, hand: &Arc<Hand>) -> Slot {
+    object.atlas_slots.get(hand).unwrap()
+}
+
+fn left() -> &'static Arc<Hand> {
+    hand("adult", Handedness::Left).unwrap()
 }
 
 /// The first grips of an object.
@@ -105,7 +109,6 @@ fn start(threads: usize, store: &Arc<ObjectStore>) -> Atlases {
     Atlases::start(threads, store, executor, None, "adult".to_owned()).unwrap()
 }
 
-/// The atlas of one hand.
 fn known(atlases: &Atlases, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Arc<Atlas>> {
     let [known, _] = atlases.get(object, [Some(hand), None]);
     known.atlas
@@ -120,7 +123,7 @@ fn until(what: &str, condition: impl Fn() -> bool) {
 }
 
 #[test]
-fn evicts_what_is_asked_for_least() {
+fn evicts_what_is_in_least_demand() {
     let [a, b, c] = ["a", "b", "c"].map(|id| Arc::new(small(id)));
     let grown = grown(&a);
     // Without threads, only this test publishes.
@@ -129,7 +132,7 @@ fn evicts_what_is_asked_for_least() {
         let builders = &atlases.0;
         builders.publish(object, adult(), Arc::clone(&grown), Duration::ZERO)
     };
-    let is_there = |object: &Arc<StoredObject>| object.atlas_slots.get(adult()).unwrap().grown.is_some();
+    let is_there = |object: &Arc<StoredObject>| slot_of(object, adult()).grown.is_some();
     for object in [&a, &b, &c] {
         atlases.0.request(object, [Some(adult()), None]);
     }
@@ -181,32 +184,31 @@ fn learns_up_to_the_limit_and_counts_it_toward_the_memory() {
     // Publishing the atlas keeps them, and evicting it drops both.
     let builders = &atlases.0;
     assert!(builders.publish(&object, adult(), Arc::clone(&known_of), Duration::ZERO));
-    let slot = object.atlas_slots.get(adult()).unwrap();
+    let slot = slot_of(&object, adult());
     assert_eq!(slot.bytes(), known_of.bytes() + slot.learned.bytes());
     assert_eq!(slot.learned.entries().len(), MOST);
     builders.objects.shrink_to(slot.bytes() - 1);
-    assert!(object.atlas_slots.get(adult()).unwrap().learned.is_empty());
+    assert!(slot_of(&object, adult()).learned.is_empty());
     // Another hand, and an object without a slot, are not concerned.
-    assert!(learned(hand("adult", Handedness::Left).unwrap()).is_empty());
+    assert!(learned(left()).is_empty());
 }
 
 #[test]
-fn learns_only_what_fits_and_only_of_hands_that_were_asked_for() {
+fn learns_only_what_fits_and_only_of_requested_hands() {
     let object = Arc::new(small("a"));
     let grip = grown(&object).atlas.entries()[0].clone();
     let no_room = start(1, &store(10, 0));
     no_room.0.request(&object, [Some(adult()), None]);
     no_room.learn(&object, adult(), grip.clone(), 5);
-    assert!(object.atlas_slots.get(adult()).unwrap().learned.is_empty());
-    let left = hand("adult", Handedness::Left).unwrap();
+    assert!(slot_of(&object, adult()).learned.is_empty());
     let atlases = start(1, &store(10, 1 << 30));
-    atlases.learn(&object, left, grip.clone(), 5);
-    assert!(object.atlas_slots.get(left).is_none());
+    atlases.learn(&object, left(), grip.clone(), 5);
+    assert!(object.atlas_slots.get(left()).is_none());
     for (threads, most) in [(0, 5), (1, 0)] {
         let atlases = start(threads, &store(10, 1 << 30));
-        atlases.0.request(&object, [Some(left), None]);
-        atlases.learn(&object, left, grip.clone(), most);
-        assert!(object.atlas_slots.get(left).unwrap().learned.is_empty());
+        atlases.0.request(&object, [Some(left()), None]);
+        atlases.learn(&object, left(), grip.clone(), most);
+        assert!(slot_of(&object, left()).learned.is_empty());
     }
 }
 
@@ -220,27 +222,9 @@ fn rebuilds_an_evicted_atlas_on_request() {
     until("the first atlas", is_there);
     object.atlas_slots.end(adult(), BuildState::Finished);
     atlases.0.objects.shrink_to(0);
-    let slot = object.atlas_slots.get(adult()).unwrap();
+    let slot = slot_of(&object, adult());
     assert_eq!((slot.state, slot.bytes()), (BuildState::Absent, 0));
     until("the second atlas", is_there);
-}
-
-#[test]
-fn shipped_grips_are_complete_and_nothing_grows() {
-    let remote = Arc::clone(&grasp_assets::objects::object("remote").unwrap().object);
-    let object = Arc::new(StoredObject::built_in("remote".to_owned(), remote));
-    let atlases = start(0, &store(10, 1 << 30));
-    object.atlas_slots.request(adult(), Duration::ZERO);
-    let job = BuildJob {
-        object: Arc::downgrade(&object),
-        hand: Arc::clone(adult()),
-        stage: Stage::Unread,
-    };
-    let turn = turn(&atlases.0, &object, &job);
-    assert_eq!(turn, Turn::Ended(BuildState::Finished));
-    let shipped = object.atlas_slots.get(adult()).unwrap().grown;
-    let shipped = shipped.expect("grips ship with the server");
-    assert!(shipped.atlas.is_complete() && shipped.atlas.entries().len() >= 50);
 }
 
 #[test]
@@ -249,35 +233,33 @@ fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
     let heavier = before.object.with_properties(9.0, Vec3::ZERO, None, &[]);
     let heavier = Arc::new(StoredObject::plain("a", heavier.unwrap()));
     let atlases = start(1, &store(10, 1 << 30));
-    let left = hand("adult", Handedness::Left).unwrap();
     let known_of = grown(&before);
     let builders = &atlases.0;
     assert!(builders.publish(&before, adult(), Arc::clone(&known_of), Duration::ZERO));
     before.atlas_slots.end(adult(), BuildState::Finished);
-    assert!(builders.publish(&before, left, Arc::clone(&known_of), Duration::ZERO));
-    before.atlas_slots.request(left, Duration::ZERO);
+    assert!(builders.publish(&before, left(), Arc::clone(&known_of), Duration::ZERO));
+    before.atlas_slots.request(left(), Duration::ZERO);
     atlases.learn(&before, adult(), known_of.atlas.entries()[0].clone(), 5);
     atlases.register_changed(&before, &same);
     atlases.register_changed(&before, &heavier);
-    let slot = |object: &StoredObject, hand| object.atlas_slots.get(hand).unwrap();
-    let complete = slot(&same, adult());
+    let complete = slot_of(&same, adult());
     assert_eq!(complete.state, BuildState::Finished);
     assert!(Arc::ptr_eq(&complete.grown.unwrap(), &known_of));
-    assert_eq!(complete.learned, slot(&before, adult()).learned);
+    assert_eq!(complete.learned, slot_of(&before, adult()).learned);
     assert_eq!(complete.learned.entries().len(), 1);
-    assert!(slot(&heavier, adult()).learned.is_empty());
+    assert!(slot_of(&heavier, adult()).learned.is_empty());
     // The heavier object's atlases start from nothing, and the left hand's goes on from where it was.
-    assert_eq!(slot(&heavier, adult()).state, BuildState::Growing);
-    assert_eq!(slot(&same, left).state, BuildState::Growing);
+    assert_eq!(slot_of(&heavier, adult()).state, BuildState::Growing);
+    assert_eq!(slot_of(&same, left()).state, BuildState::Growing);
     let has_grown = || {
-        slot(&same, left)
+        slot_of(&same, left())
             .grown
             .is_some_and(|of| of.atlas.entries().len() > 10)
     };
     until("the growth of what was not complete", has_grown);
     // All count, and can be dropped.
     builders.objects.shrink_to(0);
-    let dropped = slot(&same, adult());
+    let dropped = slot_of(&same, adult());
     assert!(dropped.grown.is_none() && dropped.learned.is_empty());
 }
 
@@ -295,7 +277,7 @@ fn read_back(test: &str, written: &Grown) -> (Arc<Grown>, usize) {
         let slot = object.atlas_slots.get(adult());
         slot.is_some_and(|slot| slot.state == BuildState::Finished)
     });
-    let slot = object.atlas_slots.get(adult()).unwrap();
+    let slot = slot_of(&object, adult());
     let read = folder
         .open()
         .read(&object, &prepared(&object), adult())
@@ -392,8 +374,7 @@ fn both_hands_of_every_new_object_become_useful_before_any_grows_on() {
     until("useful atlases", || {
         all().as_flattened().iter().all(|&count| count >= USEFUL)
     });
-    let is_complete =
-        |object: &StoredObject| object.atlas_slots.get(adult()).unwrap().state == BuildState::Finished;
+    let is_complete = |object: &StoredObject| slot_of(object, adult()).state == BuildState::Finished;
     assert!(!objects.iter().any(|object| is_complete(object)), "{:?}", all());
 }
 
@@ -402,15 +383,14 @@ fn hands_requested_together_do_not_evict_each_other() {
     let object = Arc::new(small("a"));
     let grown = grown(&object);
     let atlases = start(0, &store(10, grown.bytes() + 10));
-    let left = hand("adult", Handedness::Left).unwrap();
-    atlases.0.request(&object, [Some(adult()), Some(left)]);
+    atlases.0.request(&object, [Some(adult()), Some(left())]);
     let publish = |hand| {
         let builders = &atlases.0;
         builders.publish(&object, hand, Arc::clone(&grown), Duration::ZERO)
     };
     assert!(publish(adult()));
-    assert!(!publish(left), "there is room for one of them");
-    assert!(object.atlas_slots.get(adult()).unwrap().grown.is_some());
+    assert!(!publish(left()), "there is room for one of them");
+    assert!(slot_of(&object, adult()).grown.is_some());
 }
 
 #[test]

@@ -35,13 +35,11 @@ use crate::{
 const BYTES_PER_TRIANGLE: usize = 160;
 const BYTES_BESIDES: usize = 480 << 10;
 
-/// Where grips transferred to an object are kept once they are made.
 type GripsSlot = OnceLock<Arc<TransferredGrips>>;
 
 /// An object in the form that searches use, with what they start from. Clones share both.
 #[derive(Clone, Debug)]
 pub(crate) struct Derived {
-    /// The object.
     pub object: Arc<PreparedObject>,
     /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
     transferred_grips: Arc<[GripsSlot]>,
@@ -51,23 +49,17 @@ pub(crate) struct Derived {
 
 impl Derived {
     /// Of an object that has its search structures.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    pub(super) fn of(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Self, Stopped> {
-        Ok(Self {
+    pub(super) fn of(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Arc<Self>, Stopped> {
+        Ok(Arc::new(Self {
             object: Arc::new(PreparedObject::new_until(object, stop)?),
             transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
             preparing: Arc::default(),
-        })
+        }))
     }
 
     /// Fills the placement cache and transfers grips for both hands of a rig, which otherwise the first search with
     /// each hand would have to do. Takes some ten milliseconds per hand the first time, in parallel if the system has a thread for
     /// it.
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(crate) fn prepare(&self, rig: &str, stop: Stop<'_>) -> Result<(), Stopped> {
         // Nothing is left inconsistent if preparing panics.
         let _preparing = self.preparing.lock().unwrap_or_else(PoisonError::into_inner);
@@ -164,9 +156,8 @@ impl DerivedCell {
 
     /// True if a call uses what is kept.
     pub(super) fn is_in_use(&self) -> bool {
-        self.lock()
-            .as_ref()
-            .is_some_and(|kept| Arc::strong_count(kept) > 1)
+        let kept = self.lock();
+        kept.as_ref().is_some_and(|kept| Arc::strong_count(kept) > 1)
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<Arc<Derived>>> {
@@ -206,22 +197,13 @@ impl ObjectSize {
     }
 }
 
-/// Prepares objects at other sizes.
+/// Prepares objects at other sizes, as many at a time as there are permits: each takes as much memory as building an object.
 #[derive(Debug)]
-pub(crate) struct Resizer(Arc<Semaphore>);
+pub(crate) struct Resizer(pub Arc<Semaphore>);
 
 impl Resizer {
-    /// Prepares as many at a time as there are permits. Each takes as much memory as building an object.
-    pub(crate) fn new(permits: Arc<Semaphore>) -> Self {
-        Self(permits)
-    }
-
-    /// The object in a slot, prepared unless it is kept; `rigs` has those of its grips. It stops when `due` or when the future is dropped.
-    ///
-    /// # Errors
-    /// - [`ServiceError::DeadlineExceeded`] when it is due.
-    /// - [`ServiceError::Invalid`] if the object cannot have this size.
-    /// - [`ServiceError::Panicked`] or [`ServiceError::Cancelled`] if it was cut short.
+    /// The object in a slot, prepared unless it is kept; `rigs` has those of its grips. It stops when `due` or when the future is
+    /// dropped. [`ServiceError::Invalid`] if the object cannot have this size.
     pub(crate) async fn fill(
         &self,
         slot: SizeSlot,
@@ -252,10 +234,6 @@ impl Resizer {
 }
 
 /// A stored object at another size. Takes some ten milliseconds, up to seconds for the largest meshes.
-///
-/// # Errors
-/// - [`ServiceError::Invalid`] if the object cannot have this size.
-/// - [`ServiceError::Cancelled`] if it was stopped.
 fn resized(
     stored: &StoredObject,
     size: ObjectSize,
@@ -265,12 +243,11 @@ fn resized(
     let base = stored.derived_until(stop)?;
     let object = match base.object.resized_until(size.scale(), size.mass, stop)? {
         Ok(object) => object,
-        Err(error) => {
-            let field = match error {
-                ResizeError::Mass(_) => "holdout.mass_kg",
-                ResizeError::Mesh(_) => "holdout.scale",
-            };
-            return Err(ServiceError::invalid(field, error.to_string()));
+        Err(error @ ResizeError::Mass(_)) => {
+            return Err(ServiceError::invalid("holdout.mass_kg", error.to_string()));
+        }
+        Err(error @ ResizeError::Mesh(_)) => {
+            return Err(ServiceError::invalid("holdout.scale", error.to_string()));
         }
     };
     check_resized(&object.mesh).map_err(|wrong| ServiceError::invalid("holdout.scale", wrong))?;

@@ -6,7 +6,7 @@ use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::{Stop, Stopped},
-    geometry::mesh::TriangleMesh,
+    geometry::{mesh::TriangleMesh, zone::Zone},
     known::moved_grips::on_resized,
     model::{
         hand::{HandPose, Handedness, rig::Rig},
@@ -38,7 +38,6 @@ const TRIANGLES_PER_CHECK: usize = 256;
 pub(crate) struct Given {
     /// The centre of mass in metres, in the object's frame. `None` for that of the mesh.
     pub centre_of_mass: Option<Vec3>,
-    /// The regions.
     pub regions: Arc<[RegionFields]>,
     /// The grips to try first, or not to answer.
     pub grips: Arc<[GripFields]>,
@@ -73,9 +72,6 @@ impl Given {
     }
 
     /// Finds it on a mesh from a file. Adds a violation for each name and index that is not in the file.
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(super) fn on_mesh(
         &self,
         mesh: &TriangleMesh,
@@ -91,7 +87,7 @@ impl Given {
             let v1::Region {
                 groups, triangles, ..
             } = &region.given;
-            let named = file.named(field, groups, triangles, violations);
+            let named = file.named(field, groups, triangles);
             match region.kind {
                 RegionKind::Forbidden => {
                     forbidden.extend(named);
@@ -121,13 +117,11 @@ impl Given {
 
     /// The grips that are not to be answered.
     pub(super) fn banned(&self) -> Vec<BannedGrip> {
-        let kinds = self.grips.iter().filter_map(|grip| grip.kind);
-        kinds
-            .filter_map(|kind| match kind {
-                GripKind::Banned(banned) => Some(banned),
-                GripKind::Preferred(_) => None,
-            })
-            .collect()
+        let banned = self.grips.iter().filter_map(|grip| match grip.kind {
+            Some(GripKind::Banned(banned)) => Some(banned),
+            _ => None,
+        });
+        banned.collect()
     }
 
     /// The grips to try first with a hand, by name.
@@ -135,19 +129,17 @@ impl Given {
         let rig = &hand.hand.rig;
         let rig_name = resource_name(rig);
         let hundredths = (100.0 * hand.scale).round() as u16;
-        let grips = self.grips.iter();
-        grips
-            .filter_map(|grip| match grip.kind {
-                Some(GripKind::Preferred(preferred))
-                    if preferred.handedness == rig.handedness
-                        && preferred.hundredths == hundredths
-                        && grip.rig() == rig_name =>
-                {
-                    Some((grip.given.name.clone(), preferred.pose(rig)))
-                }
-                _ => None,
-            })
-            .collect()
+        let of_hand = self.grips.iter().filter_map(|grip| match grip.kind {
+            Some(GripKind::Preferred(preferred))
+                if preferred.handedness == rig.handedness
+                    && preferred.hundredths == hundredths
+                    && grip.rig() == rig_name =>
+            {
+                Some((grip.given.name.clone(), preferred.pose(rig)))
+            }
+            _ => None,
+        });
+        of_hand.collect()
     }
 
     /// The rig of each preferred grip whose rig is known, at the size of its hand.
@@ -174,9 +166,8 @@ impl Given {
             [own, resized].map(|object| ObjectScene::new(object, object.friction_under(Validity::Physical)));
         let moved = |preferred: PreferredGrip, rig: Option<&Rig>| {
             let Some(rig) = rig else {
-                let object_from_wrist = own.wrist_at(scale, preferred.object_from_wrist);
                 return PreferredGrip {
-                    object_from_wrist,
+                    object_from_wrist: own.wrist_at(scale, preferred.object_from_wrist),
                     ..preferred
                 };
             };
@@ -203,12 +194,10 @@ impl Given {
         }
     }
 
-    /// The grips as messages.
     pub(crate) fn grips_to_wire(&self) -> Vec<v1::KnownGrip> {
         self.grips.iter().map(|grip| grip.given.clone()).collect()
     }
 
-    /// The regions as messages.
     pub(crate) fn regions_to_wire(&self) -> Vec<v1::Region> {
         self.regions.iter().map(|region| region.given.clone()).collect()
     }
@@ -216,11 +205,7 @@ impl Given {
     /// Its estimated size in bytes.
     pub(super) fn bytes(&self) -> usize {
         let of_regions = self.regions.iter().map(|region| {
-            let of_zones: usize = region
-                .zones
-                .iter()
-                .map(grasp_synthesis::geometry::zone::Zone::bytes)
-                .sum();
+            let of_zones: usize = region.zones.iter().map(Zone::bytes).sum();
             // Numbers take up to four times as many bytes in memory as in a message.
             size_of_val(region) + 4 * region.given.encoded_len() + of_zones
         });
@@ -241,9 +226,6 @@ const CONVENTIONS: [v1::Convention; 6] = [
 ];
 
 /// Checks the preferred grips of an object of whose rigs `rig` knows the hand.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with each grip that cannot be right, [`ServiceError::Cancelled`] if it was stopped.
 pub(crate) fn check_grips(
     stored: &StoredObject,
     rig: impl Fn(&str, Handedness) -> Option<Rig>,
@@ -297,10 +279,10 @@ pub(crate) fn check_grips(
 fn in_words(misfit: Misfit) -> String {
     let most = 1e3 * MAX_PENETRATION;
     match misfit {
-        Misfit::Palm(depth) => {
-            let depth = 1e3 * depth;
-            format!("has palm or forearm {depth:.1} mm deep in the object, at most {most} mm is flesh")
-        }
+        Misfit::Palm(depth) => format!(
+            "has palm or forearm {:.1} mm deep in the object, at most {most} mm is flesh",
+            1e3 * depth
+        ),
         Misfit::Digits => {
             format!("has digits more than {most} mm deep in the object or itself, however they bend")
         }

@@ -1,6 +1,6 @@
 //! An object's mesh as a GLB file, made piece by piece when a piece is needed: of the file, nothing is kept in memory.
 
-use std::sync::Arc;
+use std::{iter, sync::Arc};
 
 use glam::Vec3;
 use grasp_synthesis::{
@@ -12,7 +12,7 @@ use serde_json::json;
 use super::{StoredObject, count};
 
 /// Largest number of bytes in a piece: as much as the transport takes at once.
-pub(crate) const PIECE_BYTES: usize = 32 << 10;
+const PIECE_BYTES: usize = 32 << 10;
 
 /// Bytes of the file's header and of the header of each of its two chunks.
 const HEADERS: usize = 12 + 8 + 8;
@@ -20,8 +20,9 @@ const HEADERS: usize = 12 + 8 + 8;
 /// Bytes of a position, and of a triangle's indices.
 const TRIPLE: usize = 12;
 
-/// Largest number of bytes of a run of forbidden triangles in the JSON, with a comma: two numbers of up to ten digits.
-const RUN_BYTES: usize = 24;
+/// Positions or triangles in a piece. The runs of forbidden triangles that begin among so many fit, too: at most every other begins
+/// one, which has up to 24 bytes in the JSON.
+const PER_PIECE: usize = PIECE_BYTES / TRIPLE;
 
 /// Stands for the runs of forbidden triangles in the JSON. No id of an object has such a character.
 const RUNS: &str = "*";
@@ -33,147 +34,57 @@ const QUOTED_RUNS: &str = "\"*\"";
 const ALLOWED_COLOUR: [f32; 4] = [0.6, 0.6, 0.6, 1.0];
 const FORBIDDEN_COLOUR: [f32; 4] = [0.7, 0.05, 0.05, 1.0];
 
-/// The file in pieces of at most [`PIECE_BYTES`].
-#[derive(Debug)]
-pub(crate) struct GlbPieces {
-    object: Arc<StoredObject>,
-    /// Keeps the object from being evicted, which would free nothing meanwhile.
-    _held: Arc<()>,
-    /// Size of the file.
-    bytes: usize,
-    /// Its JSON before and after the runs of forbidden triangles.
-    json: [String; 2],
-    /// Size of its JSON, padded with spaces to a multiple of four bytes.
-    json_bytes: usize,
-    next: Part,
-    /// Bytes of JSON so far.
-    sent_json: usize,
+/// The file in pieces of at most [`PIECE_BYTES`], which keep the object from being evicted: that would free nothing meanwhile. Takes
+/// milliseconds for the largest meshes.
+pub(crate) fn glb_pieces(object: &Arc<StoredObject>) -> impl Iterator<Item = Vec<u8>> + Send + use<> {
+    let held = object.hold();
+    let mesh = &object.object.mesh;
+    let [before, after] = document(&object.object, &object.id);
+    let runs = parts_of(object, mesh.triangles().len(), runs_from);
+    let json_bytes = before.len() + runs.clone().map(|text| text.len()).sum::<usize>() + after.len();
+    let padding = json_bytes.next_multiple_of(4) - json_bytes;
+    let [json, binary] = [json_bytes + padding, binary_bytes(mesh)];
+    let [all, json, binary] = [HEADERS + json + binary, json, binary].map(|bytes| count(bytes).to_le_bytes());
+    let start = [*b"glTF", 2_u32.to_le_bytes(), all, json, *b"JSON"].concat();
+    let json_end = [
+        after.into_bytes(),
+        vec![b' '; padding],
+        binary.to_vec(),
+        b"BIN\0".to_vec(),
+    ];
+    let positions = parts_of(object, mesh.positions().len(), |object, from| {
+        let positions = object.mesh.positions()[from..].iter().take(PER_PIECE);
+        let numbers = positions.flat_map(Vec3::to_array);
+        numbers.flat_map(f32::to_le_bytes).collect()
+    });
+    let triangles = [false, true].map(|forbidden| {
+        parts_of(object, mesh.triangles().len(), move |object, from| {
+            let triangles = object.mesh.triangles().iter().enumerate();
+            let triangles = triangles.skip(from).take(PER_PIECE);
+            let part = triangles.filter(|(place, _)| object.is_forbidden(count(*place)) == forbidden);
+            let numbers = part.flat_map(|(_, corners)| *corners);
+            numbers.flat_map(u32::to_le_bytes).collect()
+        })
+    });
+    iter::once([start, before.into_bytes()].concat())
+        .chain(runs)
+        .chain([json_end.concat()])
+        .chain(positions)
+        .chain(triangles.into_iter().flatten())
+        .filter(|piece| !piece.is_empty())
+        .zip(iter::repeat(held))
+        .map(|(piece, _)| piece)
 }
 
-/// The part of the file that comes next.
-#[derive(Clone, Copy, Debug)]
-enum Part {
-    /// The headers, and the JSON up to the runs of forbidden triangles.
-    Start,
-    /// The runs from a triangle on.
-    Runs(u32),
-    /// The rest of the JSON, and the header of what follows.
-    JsonEnd,
-    /// The positions from one on.
-    Positions(usize),
-    /// The triangles from one on, of those that may be touched or of the others.
-    Triangles { from: u32, forbidden: bool },
-    /// Nothing.
-    End,
-}
-
-impl GlbPieces {
-    /// All pieces. Takes milliseconds for the largest meshes.
-    pub(crate) fn new(object: Arc<StoredObject>) -> Self {
-        let json = document(&object.object, &object.id);
-        let runs = runs_from(&object.object, 0).enumerate();
-        let runs: usize = runs.map(|(place, run)| run_text(run, place == 0).len()).sum();
-        let json_bytes = (json[0].len() + runs + json[1].len()).next_multiple_of(4);
-        Self {
-            _held: object.hold(),
-            bytes: HEADERS + json_bytes + binary_bytes(&object.object.mesh),
-            json,
-            json_bytes,
-            object,
-            next: Part::Start,
-            sent_json: 0,
-        }
-    }
-
-    /// The bytes of the next part, or of its beginning, and what follows them.
-    fn part(&mut self) -> (Vec<u8>, Part) {
-        let object = &self.object.object;
-        let mesh = &*object.mesh;
-        match self.next {
-            Part::Start => {
-                let before = self.json[0].as_bytes();
-                self.sent_json += before.len();
-                let mut piece = b"glTF".to_vec();
-                for number in [2, count(self.bytes), count(self.json_bytes)] {
-                    piece.extend(number.to_le_bytes());
-                }
-                piece.extend(*b"JSON");
-                piece.extend(before);
-                (piece, Part::Runs(0))
-            }
-            Part::Runs(from) => {
-                let mut piece = String::new();
-                let mut next = Part::JsonEnd;
-                for run in runs_from(object, from) {
-                    if piece.len() + RUN_BYTES > PIECE_BYTES {
-                        next = Part::Runs(run[0]);
-                        break;
-                    }
-                    piece += &run_text(run, from == 0 && piece.is_empty());
-                }
-                self.sent_json += piece.len();
-                (piece.into_bytes(), next)
-            }
-            Part::JsonEnd => {
-                let mut piece = self.json[1].as_bytes().to_vec();
-                piece.resize(self.json_bytes - self.sent_json, b' ');
-                piece.extend(count(binary_bytes(mesh)).to_le_bytes());
-                piece.extend(*b"BIN\0");
-                (piece, Part::Positions(0))
-            }
-            Part::Positions(from) => {
-                let positions = mesh.positions()[from..].iter().take(PIECE_BYTES / TRIPLE);
-                let piece: Vec<u8> = positions
-                    .flat_map(Vec3::to_array)
-                    .flat_map(f32::to_le_bytes)
-                    .collect();
-                let next = if piece.is_empty() {
-                    let forbidden = false;
-                    Part::Triangles { from: 0, forbidden }
-                } else {
-                    Part::Positions(from + piece.len() / TRIPLE)
-                };
-                (piece, next)
-            }
-            Part::Triangles { from, forbidden } => {
-                let mut next = from;
-                let triangles = (from..count(mesh.triangles().len()))
-                    .filter(|&triangle| object.is_forbidden(triangle) == forbidden)
-                    .take(PIECE_BYTES / TRIPLE)
-                    .inspect(|triangle| next = triangle + 1);
-                let corners = triangles.flat_map(|triangle| mesh.triangles()[triangle as usize]);
-                let piece: Vec<u8> = corners.flat_map(u32::to_le_bytes).collect();
-                let next = match (piece.is_empty(), forbidden) {
-                    (false, _) => Part::Triangles {
-                        from: next,
-                        forbidden,
-                    },
-                    (true, false) => Part::Triangles {
-                        from: 0,
-                        forbidden: true,
-                    },
-                    (true, true) => Part::End,
-                };
-                (piece, next)
-            }
-            Part::End => (Vec::new(), Part::End),
-        }
-    }
-}
-
-impl Iterator for GlbPieces {
-    type Item = Vec<u8>;
-
-    fn next(&mut self) -> Option<Vec<u8>> {
-        while !matches!(self.next, Part::End) {
-            let (piece, next) = self.part();
-            self.next = next;
-            if !piece.is_empty() {
-                return Some(piece);
-            }
-        }
-        None
-    }
+/// What `part` makes of `count` elements of an object, from each [`PER_PIECE`]th on.
+fn parts_of<F: Fn(&PlainObject, usize) -> Vec<u8> + Clone>(
+    object: &Arc<StoredObject>,
+    count: usize,
+    part: F,
+) -> impl Iterator<Item = Vec<u8>> + Clone + use<F> {
+    let object = Arc::clone(object);
+    let places = (0..count).step_by(PER_PIECE);
+    places.map(move |from| part(&object.object, from))
 }
 
 fn binary_bytes(mesh: &TriangleMesh) -> usize {
@@ -246,24 +157,23 @@ fn document(object: &PlainObject, name: &str) -> [String; 2] {
     }
 }
 
-/// Where the forbidden triangles are among all of the mesh, whose indices contacts name, from one on: the first of each run and
-/// how many follow one another.
-fn runs_from(object: &PlainObject, from: u32) -> impl Iterator<Item = [u32; 2]> {
-    let end = count(object.mesh.triangles().len());
-    let mut from = from;
-    std::iter::from_fn(move || {
-        let first = (from..end).find(|&triangle| object.is_forbidden(triangle))?;
-        from = (first..end)
-            .find(|&triangle| !object.is_forbidden(triangle))
-            .unwrap_or(end);
-        Some([first, from - first])
-    })
-}
-
-/// A run in the list of the JSON.
-fn run_text([first, count]: [u32; 2], is_first: bool) -> String {
-    let comma = if is_first { "" } else { "," };
-    format!("{comma}[{first},{count}]")
+/// Where the forbidden triangles are among all of the mesh, whose indices contacts name: for the runs that begin among
+/// [`PER_PIECE`] triangles from one on, the first of each run and how many follow one another, as in the list of the JSON.
+fn runs_from(object: &PlainObject, from: usize) -> Vec<u8> {
+    let all = count(object.mesh.triangles().len());
+    let is_forbidden = |&triangle: &u32| object.is_forbidden(triangle);
+    let begins = |&first: &u32| is_forbidden(&first) && (first == 0 || !is_forbidden(&(first - 1)));
+    let runs = (count(from)..all).take(PER_PIECE).filter(begins).map(|first| {
+        let length = (first..all).take_while(is_forbidden).count();
+        let mut later = first + count(length)..all;
+        let comma = if later.any(|triangle| is_forbidden(&triangle)) {
+            ","
+        } else {
+            ""
+        };
+        format!("[{first},{length}]{comma}")
+    });
+    runs.collect::<String>().into_bytes()
 }
 
 #[cfg(test)]
@@ -276,7 +186,7 @@ mod tests {
 
     /// The whole file, which has the length that its header says.
     fn file(object: &Arc<StoredObject>) -> Vec<u8> {
-        let pieces: Vec<Vec<u8>> = GlbPieces::new(Arc::clone(object)).collect();
+        let pieces: Vec<Vec<u8>> = glb_pieces(object).collect();
         assert!(pieces.iter().all(|piece| piece.len() <= PIECE_BYTES));
         let file = pieces.concat();
         let length = u32::from_le_bytes(file[8..12].try_into().unwrap());
@@ -316,7 +226,6 @@ mod tests {
         }
     }
 
-    /// The file's JSON.
     fn json_of(file: &[u8]) -> serde_json::Value {
         let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
         serde_json::from_slice(&file[20..20 + length]).unwrap()

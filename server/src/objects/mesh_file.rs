@@ -8,7 +8,7 @@ use grasp_import::{Import, ImportedMesh, UpAxis};
 use grasp_synthesis::geometry::{boxes::Aabb, mesh::TriangleMesh};
 
 use super::count;
-use crate::validate::{Field, Violations, quoted};
+use crate::validate::{Field, quoted};
 
 /// Largest number of group names in an error.
 const LISTED_GROUPS: usize = 12;
@@ -82,7 +82,6 @@ impl MeshFile {
         }
     }
 
-    /// Its size in bytes.
     pub(super) fn bytes(&self) -> usize {
         let of_groups: usize = self
             .groups
@@ -95,37 +94,27 @@ impl MeshFile {
 
     /// The triangles of the mesh that a client names, ascending. Adds a violation for each name and index that is not in the
     /// file to the fields `groups` and `triangles` of `field`.
-    pub(super) fn named(
-        &self,
-        field: Field<'_>,
-        groups: &[String],
-        triangles: &[u32],
-        violations: &Violations,
-    ) -> Vec<u32> {
+    pub(super) fn named(&self, field: Field<'_>, groups: &[String], triangles: &[u32]) -> Vec<u32> {
         let mut named = Vec::new();
         for (place, name) in groups.iter().enumerate() {
             let known = self
                 .groups
                 .binary_search_by(|group| (*group.name).cmp(name.as_str()));
-            match known {
-                Ok(group) => {
-                    named.extend(self.groups[group].triangles.iter().cloned().flatten());
-                }
-                Err(_) => violations.add(
-                    field.child("groups").at(place),
-                    format_args!("is {}; {}", quoted(name), self.known_groups()),
-                ),
+            if let Ok(group) = known {
+                named.extend(self.groups[group].triangles.iter().cloned().flatten());
+            } else {
+                let field = field.child("groups").at(place);
+                field.add(format_args!("is {}; {}", quoted(name), self.known_groups()));
             }
         }
         for (place, &triangle) in triangles.iter().enumerate() {
             if triangle >= self.triangles {
-                let all = self.triangles;
-                violations.add(
-                    field.child("triangles").at(place),
-                    format_args!("is {triangle}; the mesh has {all} triangles, counted from 0"),
-                );
-            } else if let Some(index) = self.index_in_mesh(triangle) {
-                named.push(index);
+                let (field, all) = (field.child("triangles").at(place), self.triangles);
+                field.add(format_args!(
+                    "is {triangle}; the mesh has {all} triangles, counted from 0"
+                ));
+            } else {
+                named.extend(self.index_in_mesh(triangle));
             }
         }
         named.sort_unstable();
@@ -148,12 +137,8 @@ impl MeshFile {
         let names = self.groups.iter().take(LISTED_GROUPS);
         let names: Vec<String> = names.map(|group| quoted(&group.name)).collect();
         let more = self.groups.len().saturating_sub(LISTED_GROUPS);
-        let more = if more > 0 {
-            format!(" and {more} more")
-        } else {
-            String::new()
-        };
-        format!("the mesh has {}{more}", names.join(", "))
+        let more = (more > 0).then(|| format!(" and {more} more"));
+        format!("the mesh has {}{}", names.join(", "), more.unwrap_or_default())
     }
 }
 
@@ -181,20 +166,10 @@ const USUAL_ERRORS: [f32; 9] = [1e-6, 0.001, 0.01, 0.0254, 0.1, 10.0, 100.0, 100
 const UNUSUAL: &str = "m long, which is unusual";
 
 /// A warning about an unusual size, instead of one from before.
-///
-/// # Errors
-/// Why an object of this size cannot be used.
 pub(super) fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>) -> Result<(), String> {
     warnings.retain(|warning| !warning.contains(UNUSUAL));
-    let extent = mesh.aabb().extents().max_element();
-    // The negation also rejects an extent that overflowed.
-    if !within(USABLE, extent) {
-        let [smallest, largest] = USABLE;
-        return Err(format!(
-            "is {} m long; it must be {smallest} m to {largest} m: multiply meters_per_unit by what makes it so",
-            rounded(extent)
-        ));
-    }
+    let extent = usable_extent(mesh)
+        .map_err(|wrong| format!("is {wrong}: multiply meters_per_unit by what makes it so"))?;
     if !within(USUAL, extent) {
         let factor = likely_factor(extent);
         warnings.push(format!(
@@ -207,19 +182,20 @@ pub(super) fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>) -> R
 }
 
 /// Checks the size of an object that was created at a usable one.
-///
-/// # Errors
-/// Why an object of this size cannot be used.
 pub(super) fn check_resized(mesh: &TriangleMesh) -> Result<(), String> {
+    let usable = usable_extent(mesh).map(|_| ());
+    usable.map_err(|wrong| format!("makes the object {wrong}"))
+}
+
+/// The longest edge of a mesh's bounding box, or why it is not usable.
+fn usable_extent(mesh: &TriangleMesh) -> Result<f32, String> {
     let extent = mesh.aabb().extents().max_element();
-    if within(USABLE, extent) {
-        return Ok(());
+    // The negation also rejects an extent that overflowed.
+    if !within(USABLE, extent) {
+        let ([smallest, largest], extent) = (USABLE, rounded(extent));
+        return Err(format!("{extent} m long; it must be {smallest} m to {largest} m"));
     }
-    let [smallest, largest] = USABLE;
-    Err(format!(
-        "makes the object {} m long; it must be {smallest} m to {largest} m",
-        rounded(extent)
-    ))
+    Ok(extent)
 }
 
 /// A length to four digits.
@@ -270,16 +246,7 @@ pub(super) fn centre_or_computed(
 fn centre_of_volume(mesh: &TriangleMesh) -> Option<Vec3> {
     let Aabb { min, max } = Aabb::around(mesh.positions().iter().copied());
     let (low, high) = (min.as_dvec3(), max.as_dvec3());
-    // Relative to the middle of the box: far from the origin, the products would lose precision.
-    let middle = (low + high) * 0.5;
-    let (mut volume, mut moment) = (0.0, DVec3::ZERO);
-    for triangle in 0..mesh.triangles().len() {
-        let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3() - middle);
-        let tetrahedron = a.dot(b.cross(c)) / 6.0;
-        volume += tetrahedron;
-        moment += tetrahedron * (a + b + c) / 4.0;
-    }
-    let centre = moment / volume + middle;
+    let (volume, centre) = weighted_centre(mesh, 4.0, |[a, b, c]| a.dot(b.cross(c)) / 6.0);
     let is_inside = centre.cmpge(low).all() && centre.cmple(high).all();
     let has_volume = volume.abs() > MIN_VOLUME_SHARE * (high - low).element_product();
     (has_volume && is_inside).then(|| centre.as_vec3())
@@ -287,32 +254,40 @@ fn centre_of_volume(mesh: &TriangleMesh) -> Option<Vec3> {
 
 /// The centre of the surface at uniform thickness.
 fn centre_of_surface(mesh: &TriangleMesh) -> Vec3 {
-    let Aabb { min, max } = Aabb::around(mesh.positions().iter().copied());
-    let middle = (min.as_dvec3() + max.as_dvec3()) * 0.5;
-    let (mut area, mut moment) = (0.0, DVec3::ZERO);
-    for triangle in 0..mesh.triangles().len() {
-        let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3() - middle);
-        let surface = (b - a).cross(c - a).length() / 2.0;
-        area += surface;
-        moment += surface * (a + b + c) / 3.0;
-    }
     // Every triangle of a mesh has an area: no division by 0.
-    (moment / area + middle).as_vec3()
+    let (_, centre) = weighted_centre(mesh, 3.0, |[a, b, c]| (b - a).cross(c - a).length() / 2.0);
+    centre.as_vec3()
+}
+
+/// The sum of the weights of all triangles, and their centre, each being at the sum of its corners over `count`.
+fn weighted_centre(mesh: &TriangleMesh, count: f64, weight: impl Fn([DVec3; 3]) -> f64) -> (f64, DVec3) {
+    let Aabb { min, max } = Aabb::around(mesh.positions().iter().copied());
+    // Relative to the middle of the box: far from the origin, the products would lose precision.
+    let middle = (min.as_dvec3() + max.as_dvec3()) * 0.5;
+    let (mut sum, mut moment) = (0.0, DVec3::ZERO);
+    for triangle in 0..mesh.triangles().len() {
+        let corners = mesh.corners(triangle).map(|corner| corner.as_dvec3() - middle);
+        let weight = weight(corners);
+        let [a, b, c] = corners;
+        sum += weight;
+        moment += weight * (a + b + c) / count;
+    }
+    (sum, moment / sum + middle)
 }
 
 #[cfg(test)]
 mod tests {
-    use grasp_synthesis::geometry::mesh::TriangleMesh;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::validate::Violations;
 
     fn imported(
         indices_in_file: Vec<u32>,
         triangles_in_file: usize,
         groups: Vec<(String, Vec<u32>)>,
     ) -> ImportedMesh {
-        let positions = vec![glam::Vec3::ZERO, glam::Vec3::X, glam::Vec3::Y];
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
         ImportedMesh {
             mesh: TriangleMesh::new(positions, vec![[0, 1, 2]]).unwrap(),
             indices_in_file,
@@ -329,7 +304,7 @@ mod tests {
         fn forbids_the_triangles_of_the_file(
             kept in prop::collection::btree_set(0_u32..40, 1..30),
             members in prop::collection::vec(prop::collection::btree_set(0_u32..30, 0..20), 0..4),
-            asked in prop::collection::vec(0_u32..40, 0..10),
+            given in prop::collection::vec(0_u32..40, 0..10),
         ) {
             let kept: Vec<u32> = kept.into_iter().collect();
             let in_mesh = |set: &std::collections::BTreeSet<u32>| -> Vec<u32> {
@@ -340,11 +315,11 @@ mod tests {
             let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
             let file = MeshFile::of(&imported(kept.clone(), 40, groups.clone()), Import::METRES, &[]);
             let violations = Violations::default();
-            let forbidden = file.named(violations.field("forbidden"), &names, &asked, &violations);
+            let forbidden = file.named(violations.field("forbidden"), &names, &given);
             prop_assert!(violations.is_empty());
             for (index, in_file) in kept.iter().enumerate() {
                 let index = index as u32;
-                let expected = asked.contains(in_file) || groups.iter().any(|(_, group)| group.contains(&index));
+                let expected = given.contains(in_file) || groups.iter().any(|(_, group)| group.contains(&index));
                 prop_assert_eq!(forbidden.contains(&index), expected);
             }
             prop_assert!(forbidden.is_sorted());
@@ -358,10 +333,7 @@ mod tests {
         // The second check replaces the warning of the first.
         check_extent(&mesh, &mut warnings)?;
         check_extent(&mesh, &mut warnings)?;
-        assert!(
-            (1..=2).contains(&warnings.len()) && warnings[0] == "another",
-            "{warnings:?}"
-        );
+        assert!(warnings.len() <= 2 && warnings[0] == "another", "{warnings:?}");
         Ok(warnings.into_iter().nth(1))
     }
 
@@ -413,29 +385,13 @@ mod tests {
     }
 
     fn boxed(low: Vec3, high: Vec3, without_lid: bool) -> TriangleMesh {
-        let corner = |i: usize| {
-            Vec3::new(
-                if i & 1 == 0 { low.x } else { high.x },
-                if i & 2 == 0 { low.y } else { high.y },
-                if i & 4 == 0 { low.z } else { high.z },
-            )
-        };
-        let mut triangles = vec![
-            [0, 2, 1],
-            [1, 2, 3],
-            [0, 1, 4],
-            [1, 5, 4],
-            [0, 4, 2],
-            [2, 4, 6],
-            [1, 3, 5],
-            [3, 7, 5],
-            [2, 6, 3],
-            [3, 6, 7],
+        let corner = |i: usize| Vec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low);
+        let sides = [
+            0, 2, 3, 1, 0, 1, 5, 4, 0, 4, 6, 2, 1, 3, 7, 5, 2, 6, 7, 3, 4, 5, 7, 6,
         ];
-        if !without_lid {
-            triangles.extend([[4, 5, 6], [5, 7, 6]]);
-        }
-        TriangleMesh::new((0..8).map(corner).collect(), triangles).unwrap()
+        let sides = sides.chunks(4).take(if without_lid { 5 } else { 6 });
+        let triangles = sides.flat_map(|side| [[side[0], side[1], side[2]], [side[0], side[2], side[3]]]);
+        TriangleMesh::new((0..8).map(corner).collect(), triangles.collect()).unwrap()
     }
 
     #[test]
@@ -444,7 +400,7 @@ mod tests {
         let (centre, is_of_surface) = measured(&boxed(low, low + Vec3::new(0.1, 0.2, 0.3), false));
         assert!(!is_of_surface);
         assert!(
-            (centre - (low + Vec3::new(0.05, 0.1, 0.15))).length() < 1e-5,
+            centre.distance(low + Vec3::new(0.05, 0.1, 0.15)) < 1e-5,
             "{centre}"
         );
     }
@@ -461,9 +417,6 @@ mod tests {
     #[test]
     fn centre_of_an_open_box_is_inside() {
         let (centre, _) = measured(&boxed(Vec3::ZERO, Vec3::ONE, true));
-        assert!(
-            centre.cmpge(Vec3::ZERO).all() && centre.cmple(Vec3::ONE).all(),
-            "{centre}"
-        );
+        assert_eq!(centre, centre.clamp(Vec3::ZERO, Vec3::ONE));
     }
 }

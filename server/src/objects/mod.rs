@@ -17,7 +17,6 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
-use glam::DVec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::{Stop, Stopped, unstopped},
@@ -37,26 +36,17 @@ use crate::{
     wire::{hex, wire_pose},
 };
 
-/// An object as the server keeps it.
 #[derive(Debug)]
 pub(crate) struct StoredObject {
-    /// The last part of its name.
     pub id: String,
-    /// True if it is part of the server.
     pub built_in: bool,
-    /// The object at rest.
     pub object: PlainObject,
     /// SHA-256 of vertices, triangles and forbidden set, in hexadecimal.
     pub content_hash: String,
-    /// Oddities of its mesh.
     pub warnings: Vec<String>,
-    /// What is kept of its file.
     pub file: Arc<MeshFile>,
-    /// What its client knows of it.
     pub given: Given,
-    /// Its atlases.
     pub atlas_slots: AtlasSlots,
-    /// What is derived from it.
     derived: DerivedCell,
     /// Cloned by every call that uses the object.
     uses: Arc<()>,
@@ -76,7 +66,6 @@ impl StoredObject {
         stored
     }
 
-    /// An object of a client.
     fn new(
         id: String,
         object: PlainObject,
@@ -99,30 +88,17 @@ impl StoredObject {
     }
 
     /// Keeps what is derived from an object that has its search structures.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    pub(crate) fn fill(&self, object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Arc<Derived>, Stopped> {
-        self.derived
-            .get_or_build(|| Ok(Arc::new(Derived::of(object, stop)?)))
+    fn fill(&self, object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Arc<Derived>, Stopped> {
+        self.derived.get_or_build(|| Derived::of(object, stop))
     }
 
     /// What is derived from it, built if necessary: some ten milliseconds, up to seconds for the largest meshes. It stays until
     /// the object is dropped; the store does the same within the bounds of the cache.
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(crate) fn derived_until(&self, stop: Stop<'_>) -> Result<Arc<Derived>, Stopped> {
         self.derived.get_or_build(|| {
             let object = GraspObject::of_until(self.object.clone(), stop)?;
-            Ok(Arc::new(Derived::of(Arc::new(object), stop)?))
+            Derived::of(Arc::new(object), stop)
         })
-    }
-
-    /// Takes what was derived from an object of the same content.
-    fn share(&self, twin: &Derived) -> Arc<Derived> {
-        let shared = self.derived.get_or_build(|| Ok(Arc::new(twin.clone())));
-        shared.unwrap_or_else(|Stopped| Arc::new(twin.clone()))
     }
 
     /// Keeps it from being evicted, and what is derived from it with it, as long as the reference is held.
@@ -130,7 +106,6 @@ impl StoredObject {
         Arc::clone(&self.uses)
     }
 
-    /// "objects/{object}".
     pub(crate) fn name(&self) -> String {
         name_of(&self.id)
     }
@@ -175,22 +150,17 @@ impl StoredObject {
     fn description(&self) -> v1::GraspObject {
         let mesh = &self.object.mesh;
         let bounding_box = &self.object.bounding_box;
-        let MeshFile {
-            unit_metres,
-            z_up,
-            ref parts,
-            origin,
-            ..
-        } = *self.file;
+        let file = &self.file;
+        let origin = file.origin.to_array();
         v1::GraspObject {
             name: self.name(),
             built_in: self.built_in,
             mass_kg: self.object.mass,
             center_of_mass: Some(self.object.centre_of_mass.into()),
             friction: self.object.friction,
-            meters_per_unit: Some(unit_metres),
-            z_up,
-            parts: parts.to_vec(),
+            meters_per_unit: Some(file.unit_metres),
+            z_up: file.z_up,
+            parts: file.parts.to_vec(),
             triangle_count: count(mesh.triangles().len()),
             forbidden_triangle_count: count(self.object.forbidden_count()),
             bounding_box: Some(v1::BoxShape {
@@ -199,10 +169,10 @@ impl StoredObject {
             }),
             content_hash: self.content_hash.clone(),
             warnings: self.warnings.clone(),
-            origin_in_file: if origin == DVec3::ZERO {
+            origin_in_file: if origin == [0.0; 3] {
                 Vec::new()
             } else {
-                origin.to_array().to_vec()
+                origin.into()
             },
             ..v1::GraspObject::default()
         }
@@ -212,11 +182,8 @@ impl StoredObject {
 /// The state of an object that changes without its search structures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Record {
-    /// Labels that clients gave it.
     pub labels: Labels,
-    /// Identifies the state.
     pub etag: String,
-    /// When the object was created.
     pub created: SystemTime,
     /// When a client last changed it; not before `created`.
     pub updated: SystemTime,
@@ -225,16 +192,13 @@ pub(crate) struct Record {
 /// An object in one of its states, ready for searches.
 #[derive(Clone, Debug)]
 pub(crate) struct Revision {
-    /// The object.
     pub object: Arc<StoredObject>,
-    /// Its labels, etag and times.
     pub record: Arc<Record>,
 }
 
 /// An object or what is in memory of it.
 #[derive(Clone, Debug)]
 pub(crate) enum Body {
-    /// Ready for searches.
     Loaded(Arc<StoredObject>),
     /// Saved, and loaded when it is needed: the message that describes it, without labels, etag, times, regions and known grips.
     AtRest(Arc<v1::GraspObject>),
@@ -243,23 +207,12 @@ pub(crate) enum Body {
 /// An object in one of its states, as lists show it: ready for searches or not.
 #[derive(Clone, Debug)]
 pub(crate) struct Listed {
-    /// The object.
     pub body: Body,
-    /// Its labels, etag and times.
     pub record: Arc<Record>,
 }
 
 /// Bytes that a label takes beside its characters.
 const LABEL_OVERHEAD: usize = 2 * size_of::<String>();
-
-impl From<Revision> for Listed {
-    fn from(Revision { object, record }: Revision) -> Self {
-        Self {
-            body: Body::Loaded(object),
-            record,
-        }
-    }
-}
 
 impl Listed {
     /// The last part of the object's name.
@@ -278,15 +231,15 @@ impl Listed {
         }
     }
 
-    /// The state with its object, if that is ready for searches.
-    pub(crate) fn loaded(&self) -> Option<Revision> {
-        Some(Revision {
-            object: Arc::clone(self.object()?),
-            record: Arc::clone(&self.record),
-        })
+    /// The state of an object that is ready for searches, or else what describes it.
+    pub(crate) fn loaded(self) -> Result<Revision, Arc<v1::GraspObject>> {
+        let record = self.record;
+        match self.body {
+            Body::Loaded(object) => Ok(Revision { object, record }),
+            Body::AtRest(resting) => Err(resting),
+        }
     }
 
-    /// Its estimated size in bytes in the cache, without atlases.
     fn bytes(&self) -> usize {
         let Some(object) = self.object() else { return 0 };
         let labels = self.record.labels.iter();
@@ -294,7 +247,6 @@ impl Listed {
         object.bytes() + of_labels.sum::<usize>()
     }
 
-    /// Where the object is in lists.
     pub(crate) fn place(&self) -> Place {
         Place {
             created: nanoseconds(self.record.created),
@@ -335,7 +287,6 @@ pub(crate) fn name_of(id: &str) -> String {
     format!("{COLLECTION}{id}")
 }
 
-/// The id in a resource name.
 pub(crate) fn id_of(name: &str) -> &str {
     name.strip_prefix(COLLECTION).unwrap_or(name)
 }

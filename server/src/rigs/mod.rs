@@ -29,7 +29,6 @@ pub(crate) struct RigHand {
 }
 
 impl RigHand {
-    /// A hand without a model.
     pub(crate) fn without_model(hand: &Arc<Hand>) -> Self {
         Self {
             hand: Arc::clone(hand),
@@ -55,7 +54,6 @@ pub(crate) struct StoredRig {
 }
 
 impl StoredRig {
-    /// One of its hands.
     pub(crate) fn hand(&self, handedness: Handedness) -> &RigHand {
         match handedness {
             Handedness::Left => &self.hands[0],
@@ -142,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keeps_the_hands_asked_for_last() {
+    fn keeps_the_hands_requested_last() {
         let hands = ScaledHands::default();
         let adult = RigHand::without_model(hand("adult", Handedness::Right).expect("it is built in"));
         let first = hands.get(&adult, 80).hand;

@@ -17,7 +17,7 @@ use prost::Message;
 use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
     error::ServiceError,
-    saved::{RIGS, Records, SavedFiles, Unreadable, seal, wait_for},
+    saved::{FieldMove, RIGS, Records, SavedFiles, Unreadable, field, message, move_fields, seal, wait_for},
 };
 
 /// All rigs.
@@ -55,7 +55,6 @@ impl RigStore {
         }
     }
 
-    /// The rig that a request names: "rigs/{rig}".
     pub(crate) fn named(&self, name: &str) -> Option<Arc<StoredRig>> {
         self.find(name.strip_prefix(COLLECTION)?)
     }
@@ -66,10 +65,6 @@ impl RigStore {
         Some((*stored.hand(handedness).hand.rig).clone())
     }
 
-    /// The rig with this id.
-    ///
-    /// # Errors
-    /// [`ServiceError::RigNotFound`], [`ServiceError::RigDamaged`].
     pub(crate) fn get(&self, id: &str) -> Result<Arc<StoredRig>, ServiceError> {
         self.find(id).ok_or_else(|| {
             let name = name_of(id);
@@ -99,9 +94,6 @@ impl RigStore {
     }
 
     /// Checks that a rig can be added: called before a rig is made, so that none is made in vain.
-    ///
-    /// # Errors
-    /// [`ServiceError::RigExists`], [`ServiceError::RigsFull`].
     pub(crate) fn check_room(&self, id: &str) -> Result<(), ServiceError> {
         if self.built_in.contains_key(id) || self.created().contains_key(id) {
             return Err(ServiceError::RigExists { name: name_of(id) });
@@ -119,16 +111,17 @@ impl RigStore {
         self.saved.as_ref()
     }
 
-    /// What is saved of a rig that this request makes; nothing if rigs are in memory only.
+    /// What is saved of a rig that this request makes. `None` if rigs are in memory only.
     pub(crate) fn record(&self, request: &v1::CreateRigRequest) -> Option<Bytes> {
-        let saved = self.saved.as_ref();
-        saved.map(|_| seal(&SavedRig::from(request.clone())))
+        let record = |_: &Records| {
+            seal(&SavedRig {
+                request: Some(request.clone()),
+            })
+        };
+        self.saved.as_ref().map(record)
     }
 
     /// Adds a rig, and saves its record if there is one.
-    ///
-    /// # Errors
-    /// [`ServiceError::RigExists`], [`ServiceError::RigsFull`], and [`ServiceError::StoreFailed`] if it cannot be saved.
     pub(crate) fn insert(
         &self,
         rig: StoredRig,
@@ -139,8 +132,8 @@ impl RigStore {
         if let Some((saved, record)) = self.saved.as_ref().zip(record) {
             let mut names = self.ids();
             names.push(rig.id.clone());
-            let created = saved.create(&rig.id, record, names, async { Ok(()) });
-            wait_for(created).map_err(|_| ServiceError::StoreFailed)?;
+            let created = wait_for(saved.create(&rig.id, record, names));
+            created.map_err(|_| ServiceError::StoreFailed)?;
         }
         let rig = Arc::new(rig);
         self.created().insert(rig.id.clone(), Some(Arc::clone(&rig)));
@@ -151,18 +144,13 @@ impl RigStore {
     pub(crate) fn add_saved(&self, rig: StoredRig, was_damaged: bool) -> Arc<StoredRig> {
         let rig = Arc::new(rig);
         let mut created = self.created();
-        let is_damaged = created.get(&rig.id).is_some_and(Option::is_none);
-        if is_damaged == was_damaged {
+        if created.get(&rig.id).is_some_and(Option::is_none) == was_damaged {
             created.insert(rig.id.clone(), Some(Arc::clone(&rig)));
         }
         rig
     }
 
     /// Removes a created rig.
-    ///
-    /// # Errors
-    /// [`ServiceError::RigNotFound`], [`ServiceError::RigBuiltIn`], and [`ServiceError::StoreFailed`] if what was saved cannot be
-    /// deleted.
     pub(crate) fn delete(&self, id: &str) -> Result<(), ServiceError> {
         if self.built_in.contains_key(id) {
             return Err(ServiceError::RigBuiltIn { name: name_of(id) });
@@ -228,31 +216,17 @@ fn built_in(name: &str) -> Option<StoredRig> {
 /// Largest record in bytes: a model of the largest size that a server can be configured to take, and what is beside it.
 const MAX_RECORD: u64 = 1 << 30;
 
-/// The digits, thumb first.
-const DIGITS: [v1::Digit; 5] = [
-    v1::Digit::Thumb,
-    v1::Digit::Index,
-    v1::Digit::Middle,
-    v1::Digit::Ring,
-    v1::Digit::Little,
-];
-
-/// The records of rigs.
 pub(crate) fn saved_rigs(files: Arc<SavedFiles>) -> Records {
     Records::new(files, RIGS, MAX_RECORD)
 }
 
-/// The request that made a rig.
-///
-/// # Errors
-/// It cannot be read; within, what is wrong with the record.
+/// The request that made a rig. The inner error is what is wrong with its record.
 pub(crate) async fn saved_request(
     rigs: &Records,
     id: &str,
 ) -> Result<Result<v1::CreateRigRequest, Unreadable>, Error> {
     let parse = |message: &[u8]| {
-        let saved = SavedRig::decode(message).map_err(|_| Unreadable::Message)?;
-        let request = v1::CreateRigRequest::from(saved);
+        let request = request_of(message).ok_or(Unreadable::Message)?;
         if request.rig_id == id {
             Ok(request)
         } else {
@@ -262,118 +236,50 @@ pub(crate) async fn saved_request(
     rigs.read(id, parse).await
 }
 
-/// What a client sent to create a rig. Version 0.1 wrote the fields before the request, which are read, but not written.
+/// What a client sent to create a rig.
 #[derive(Clone, PartialEq, Message)]
-pub(crate) struct SavedRig {
-    #[prost(string, tag = "1")]
-    id: String,
-    #[prost(bytes = "vec", tag = "2")]
-    model: Vec<u8>,
-    #[prost(message, optional, tag = "3")]
-    joints: Option<HandsAtRest>,
-    #[prost(message, repeated, tag = "4")]
-    joint_map: Vec<v1::RigNode>,
-    #[prost(message, repeated, tag = "5")]
-    limits: Vec<Limits>,
-    #[prost(enumeration = "v1::Handedness", tag = "6")]
-    side: i32,
-    #[prost(bytes = "vec", tag = "7")]
-    other_model: Vec<u8>,
-    /// 0: 1.
-    #[prost(float, tag = "8")]
-    width_scale: f32,
-    #[prost(btree_map = "string, float", tag = "9")]
-    radii: BTreeMap<String, f32>,
+struct SavedRig {
+    /// `None` in records of version 0.1.
     #[prost(message, optional, tag = "10")]
     request: Option<v1::CreateRigRequest>,
 }
 
-#[derive(Clone, PartialEq, Message)]
-struct HandsAtRest {
-    #[prost(message, repeated, tag = "1")]
-    hands: Vec<HandAtRest>,
-}
+/// Where the fields of a record of version 0.1 are in a request now.
+const REQUEST: &[FieldMove] = &[
+    field(1, &[1]),
+    field(2, &[2]),
+    message(3, &[], &[message(1, &[3], &[field(1, &[1]), field(3, &[2])])]),
+    field(4, &[4]),
+    message(5, &[5], LIMITS),
+    field(6, &[6]),
+    field(7, &[2]),
+    field(8, &[7]),
+    field(9, &[8]),
+];
 
-#[derive(Clone, PartialEq, Message)]
-struct HandAtRest {
-    #[prost(enumeration = "v1::Handedness", tag = "1")]
-    side: i32,
-    #[prost(message, repeated, tag = "3")]
-    joints: Vec<v1::JointPose>,
-}
+/// The range of each joint, and the digit if it has a number.
+const LIMITS: &[FieldMove] = &[
+    message(1, &[], &[field(1, &[2, 1]), field(2, &[3, 1])]),
+    message(2, &[], &[field(1, &[2, 2]), field(2, &[3, 2])]),
+    message(3, &[], &[field(1, &[2, 3]), field(2, &[3, 3])]),
+    message(4, &[], &[field(1, &[2, 4]), field(2, &[3, 4])]),
+    field(5, &[1]),
+];
 
-#[derive(Clone, Copy, PartialEq, Message)]
-struct Limits {
-    #[prost(message, optional, tag = "1")]
-    base_yaw: Option<Range>,
-    #[prost(message, optional, tag = "2")]
-    base_pitch: Option<Range>,
-    #[prost(message, optional, tag = "3")]
-    second_pitch: Option<Range>,
-    #[prost(message, optional, tag = "4")]
-    third_pitch: Option<Range>,
-    /// 1 is the thumb. 0, in records of version 0.1: its place in the list says it.
-    #[prost(uint32, tag = "5")]
-    digit: u32,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct Range {
-    #[prost(float, tag = "1")]
-    min: f32,
-    #[prost(float, tag = "2")]
-    max: f32,
-}
-
-impl From<v1::CreateRigRequest> for SavedRig {
-    fn from(request: v1::CreateRigRequest) -> Self {
-        Self {
-            request: Some(request),
-            ..Self::default()
+fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
+    if let Some(request) = SavedRig::decode(record).ok()?.request {
+        return Some(request);
+    }
+    let mut request = v1::CreateRigRequest::decode(&*move_fields(record, REQUEST)?).ok()?;
+    for (place, limits) in (1..).zip(&mut request.limits) {
+        if limits.digit == 0 {
+            limits.digit = place;
+        }
+        for angles in [&mut limits.min, &mut limits.max] {
+            angles.get_or_insert_default().third_pitch.get_or_insert_default();
         }
     }
-}
-
-impl From<SavedRig> for v1::CreateRigRequest {
-    fn from(saved: SavedRig) -> Self {
-        if let Some(request) = saved.request {
-            return request;
-        }
-        let models = [saved.model, saved.other_model];
-        let hands = saved.joints.into_iter().flat_map(|joints| joints.hands);
-        let limits = saved.limits.into_iter().enumerate();
-        Self {
-            rig_id: saved.id,
-            models: models.into_iter().filter(|model| !model.is_empty()).collect(),
-            joints: hands
-                .map(|hand| v1::HandJoints::new(hand.side(), hand.joints))
-                .collect(),
-            joint_map: saved.joint_map,
-            limits: limits.map(|(place, limits)| limits.of_digit_at(place)).collect(),
-            handedness: saved.side,
-            width_scale: Some(saved.width_scale).filter(|scale| *scale != 0.0),
-            radii: saved.radii,
-        }
-    }
-}
-
-impl Limits {
-    /// The limits, which are at this place of a list.
-    fn of_digit_at(self, place: usize) -> v1::DigitLimits {
-        let place = (self.digit as usize).checked_sub(1).unwrap_or(place);
-        let ranges = [
-            self.base_yaw,
-            self.base_pitch,
-            self.second_pitch,
-            self.third_pitch,
-        ]
-        .map(Option::unwrap_or_default);
-        v1::DigitLimits {
-            digit: DIGITS.get(place).copied().unwrap_or_default().into(),
-            min: Some(v1::DigitAngles::new(ranges.map(|range| range.min))),
-            max: Some(v1::DigitAngles::new(ranges.map(|range| range.max))),
-        }
-    }
+    Some(request)
 }
 
 #[cfg(test)]
@@ -404,12 +310,7 @@ mod tests {
 
     #[test]
     fn limits_of_version_0_1_are_of_the_digit_of_their_place() {
-        let saved = SavedRig {
-            limits: vec![Limits::default(); 5],
-            ..Default::default()
-        };
-        let request = v1::CreateRigRequest::from(saved);
-        let digits = request.limits.into_iter().map(|limits| limits.digit());
-        assert!(digits.eq(DIGITS));
+        let request = request_of(&[0x2a, 0].repeat(5)).unwrap();
+        assert!(request.limits.iter().map(|limits| limits.digit).eq(1..=5));
     }
 }

@@ -22,22 +22,19 @@ use object_store::{
     Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, local::LocalFileSystem, path::Path as ObjectPath,
 };
 
-pub(crate) use self::records::{NotCreated, Records, Unreadable, seal};
+pub(crate) use self::records::{
+    FieldMove, NotCreated, Records, Unreadable, field, message, move_fields, seal,
+};
 use crate::error::ServiceError;
 
-/// Folder of the records of objects.
+/// Folders of the records of objects, of their mesh files, and of the records of rigs.
 pub(crate) const OBJECTS: &str = "objects";
-
-/// Folder of the mesh files of objects.
 pub(crate) const MESHES: &str = "meshes";
-
-/// Folder of the records of rigs.
 pub(crate) const RIGS: &str = "rigs";
 
 /// A file in a folder that stays when everything else is deleted: without it, the folder is not the one that was written to.
 const MARK: &str = ".grasp";
 
-/// What a folder must be.
 const NEEDED: &str = "it must be a folder that only this server writes to, or memory, with which created objects and rigs end with \
                       the server";
 
@@ -62,9 +59,6 @@ pub struct StoreError {
 
 impl SavedFiles {
     /// Opens the place that the configuration names. `None` if nothing is saved.
-    ///
-    /// # Errors
-    /// The place cannot be used.
     pub(crate) fn open(place: &StorePlace) -> Result<Option<Self>, StoreError> {
         let error = |reason: &dyn fmt::Display| StoreError {
             place: place.to_string(),
@@ -95,7 +89,6 @@ impl SavedFiles {
         }))
     }
 
-    /// An error of the start.
     pub(crate) fn error(&self, reason: &dyn fmt::Display) -> StoreError {
         StoreError {
             place: self.place.clone(),
@@ -103,21 +96,12 @@ impl SavedFiles {
         }
     }
 
-    /// True if a folder is the one that [`Self::mark`] marked.
-    ///
-    /// # Errors
-    /// The place failed.
     pub(crate) async fn is_marked(&self, folder: &str) -> Result<bool, Error> {
-        Ok(self
-            .read(&ObjectPath::from_iter([folder, MARK]), 0)
-            .await?
-            .is_some())
+        let mark = self.read(&ObjectPath::from_iter([folder, MARK]), 0).await?;
+        Ok(mark.is_some())
     }
 
     /// Marks a folder, so that another one in its place shows, such as that of a volume that is not mounted.
-    ///
-    /// # Errors
-    /// The place failed.
     pub(crate) async fn mark(&self, folder: &str) -> Result<(), Error> {
         if self.is_marked(folder).await? {
             return Ok(());
@@ -127,23 +111,17 @@ impl SavedFiles {
     }
 
     /// The names of the files in a folder, with their sizes.
-    ///
-    /// # Errors
-    /// They cannot be read.
     pub(crate) async fn list(&self, folder: &str) -> Result<HashMap<String, u64>, Error> {
         let files = self.files.list(Some(&ObjectPath::from(folder)));
-        let names = files.map_ok(|ObjectMeta { location, size, .. }| {
-            let name = location.filename().unwrap_or_default().to_owned();
-            (name, size)
+        let sizes = files.map_ok(|ObjectMeta { location, size, .. }| {
+            (location.filename().unwrap_or_default().to_owned(), size)
         });
-        let named: HashMap<String, u64> = names.try_collect().await?;
-        Ok(named.into_iter().filter(|(name, _)| name != MARK).collect())
+        let mut sizes: HashMap<String, u64> = sizes.try_collect().await?;
+        sizes.remove(MARK);
+        Ok(sizes)
     }
 
     /// Writes a file as a whole: it is as it was, or as it is to be.
-    ///
-    /// # Errors
-    /// It cannot be written.
     pub(crate) async fn write(&self, path: &ObjectPath, bytes: Bytes) -> Result<(), Error> {
         self.files.put(path, bytes.into()).await?;
         if let Some(folder) = &self.folder {
@@ -153,18 +131,14 @@ impl SavedFiles {
     }
 
     /// Deletes a file for good; one that is missing counts as deleted.
-    ///
-    /// # Errors
-    /// It cannot be deleted.
     pub(crate) async fn delete(&self, path: &ObjectPath) -> Result<(), Error> {
         match self.files.delete(path).await {
             Err(Error::NotFound { .. }) => {}
             result => result?,
         }
-        let synced = self.folder.as_ref().map_or(Ok(()), |folder| {
-            let parent = path.parts().next();
-            folder.sync(parent.as_ref().map_or("", AsRef::as_ref))
-        });
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let parent = path.parts().next();
+        let synced = folder.sync(parent.as_ref().map_or("", AsRef::as_ref));
         synced.map_err(|source| Error::Generic {
             store: "folder",
             source: source.into(),
@@ -172,9 +146,6 @@ impl SavedFiles {
     }
 
     /// Reads a file; nothing of it if it has more than `most` bytes. `None` if there is no such file.
-    ///
-    /// # Errors
-    /// It cannot be read.
     pub(crate) async fn read(&self, path: &ObjectPath, most: u64) -> Result<Option<Bytes>, Error> {
         let file = match self.files.get(path).await {
             Err(Error::NotFound { .. }) => return Ok(None),
@@ -187,10 +158,16 @@ impl SavedFiles {
     }
 }
 
-/// The error of a call for one of the store, whose details only the log has.
-pub(crate) fn failed(error: &Error) -> ServiceError {
+/// The error of a call; only the log has the details.
+impl From<Error> for ServiceError {
+    fn from(error: Error) -> Self {
+        log_failure(&error);
+        Self::StoreFailed
+    }
+}
+
+fn log_failure(error: &Error) {
     tracing::error!(%error, "the store failed");
-    ServiceError::StoreFailed
 }
 
 /// Waits for a future, on a thread that may block.
@@ -219,23 +196,21 @@ const UNFINISHED: char = '#';
 
 /// A folder that only this server uses, as long as this lives.
 #[derive(Debug)]
-pub(super) struct OwnedFolder {
+struct OwnedFolder {
     path: PathBuf,
     _lock: File,
 }
 
 impl OwnedFolder {
-    /// Creates the folder with these subfolders if necessary, takes it, and removes what interrupted writes left.
-    ///
-    /// # Errors
-    /// It cannot be used, lacks a subfolder that it had, or another server uses it.
-    pub(super) fn open(path: &Path, subfolders: &[&str]) -> io::Result<Self> {
+    /// Creates the folder with these subfolders if necessary, takes it, and removes what interrupted writes left. An error if it
+    /// lacks a subfolder that it had, or if another server uses it.
+    fn open(path: &Path, subfolders: &[&str]) -> io::Result<Self> {
         let is_new = !path.join(LOCK).exists();
-        let missing = subfolders.iter().find(|subfolder| !path.join(subfolder).is_dir());
-        if let Some(missing) = missing.filter(|_| !is_new) {
-            let missing = path.join(missing).display().to_string();
+        let missing = |subfolder: &&str| !is_new && !path.join(subfolder).is_dir();
+        if let Some(missing) = subfolders.iter().find(|subfolder| missing(subfolder)) {
             return Err(io::Error::other(format!(
-                "{missing} is missing; mount the volume that has it, or create it empty to start without what it had"
+                "{} is missing; mount the volume that has it, or create it empty to start without what it had",
+                path.join(missing).display()
             )));
         }
         create_private(path)?;
@@ -247,9 +222,7 @@ impl OwnedFolder {
         while let Err(error) = lock.try_lock() {
             match error {
                 TryLockError::WouldBlock if start.elapsed() < LOCK_WAIT => thread::sleep(LOCK_RETRY),
-                TryLockError::WouldBlock => {
-                    return Err(io::Error::other("another server uses it"));
-                }
+                TryLockError::WouldBlock => return Err(io::Error::other("another server uses it")),
                 TryLockError::Error(error) => return Err(error),
             }
         }
@@ -281,10 +254,7 @@ impl OwnedFolder {
     }
 
     /// Waits until the names in a subfolder are on the disk: a deleted file is gone even if the power fails.
-    ///
-    /// # Errors
-    /// The disk failed.
-    pub(super) fn sync(&self, subfolder: &str) -> io::Result<()> {
+    fn sync(&self, subfolder: &str) -> io::Result<()> {
         // Only Unix can open a folder to synchronise it.
         if cfg!(unix) {
             File::open(self.path.join(subfolder))?.sync_all()?;
@@ -294,9 +264,6 @@ impl OwnedFolder {
 }
 
 /// Creates a folder for this user only, with those above it, or takes one that is there from all others.
-///
-/// # Errors
-/// It cannot be created.
 pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
     let mut builder = DirBuilder::new();
     #[cfg(unix)]
@@ -367,11 +334,10 @@ impl Default for StorePlace {
 impl StorePlace {
     /// The folder. `None` if objects are elsewhere.
     pub(crate) fn folder(&self) -> Option<&Path> {
-        match self {
-            Self::Folder(path) => Some(path),
-            Self::Memory => None,
-            #[cfg(feature = "s3")]
-            Self::S3 { .. } => None,
+        if let Self::Folder(path) = self {
+            Some(path)
+        } else {
+            None
         }
     }
 
@@ -384,10 +350,9 @@ impl StorePlace {
             #[cfg(feature = "s3")]
             Some(("s3", place)) => {
                 let (bucket, prefix) = place.split_once('/').unwrap_or((place, ""));
-                let prefix = prefix.trim_matches('/').to_owned();
                 (!bucket.is_empty()).then(|| Self::S3 {
                     bucket: bucket.to_owned(),
-                    prefix,
+                    prefix: prefix.trim_matches('/').to_owned(),
                 })
             }
             Some(_) => None,
@@ -409,13 +374,6 @@ impl fmt::Display for StorePlace {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_default_is_a_folder_of_that_name() {
-        let place = StorePlace::default();
-        assert!(place.folder().unwrap().ends_with(DEFAULT_FOLDER), "{place}");
-        assert_eq!(StorePlace::parse(&place.to_string()), Some(place));
-    }
 
     #[test]
     fn other_schemes_and_nothing_are_no_places() {

@@ -4,11 +4,10 @@ use std::{collections::BTreeSet, fmt, sync::Arc};
 
 use bytes::Bytes;
 use object_store::{Error, path::Path};
-use prost::Message;
+use prost::{Message, decode_length_delimiter, encode_length_delimiter};
 use sha2::{Digest as _, Sha256};
 
-use super::{SavedFiles, StoreError, failed};
-use crate::error::ServiceError;
+use super::{SavedFiles, StoreError, log_failure};
 
 /// Length of the hash before the message.
 const HASH_BYTES: usize = 32;
@@ -19,21 +18,16 @@ const MAX_NAMES: u64 = 1 << 30;
 /// What is wrong with a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unreadable {
-    /// There is no such file.
     #[error("its file is missing")]
     Missing,
-    /// Its bytes do not have the hash before them.
     #[error("its SHA-256 does not match its content")]
     Hash,
-    /// They are no message of this version.
     #[error("its content is not a record of this version")]
     Message,
-    /// They are the record of something else.
     #[error("it has the name of another record")]
     Name,
 }
 
-/// A message as bytes.
 pub(crate) fn seal(message: &impl Message) -> Bytes {
     let mut bytes = Vec::with_capacity(HASH_BYTES + message.encoded_len());
     bytes.resize(HASH_BYTES, 0);
@@ -44,16 +38,10 @@ pub(crate) fn seal(message: &impl Message) -> Bytes {
 }
 
 /// The message of sealed bytes.
-///
-/// # Errors
-/// The hash is wrong.
 fn unsealed(bytes: &[u8]) -> Result<&[u8], Unreadable> {
-    let (hash, message) = bytes.split_at_checked(HASH_BYTES).ok_or(Unreadable::Hash)?;
-    if Sha256::digest(message).as_slice() == hash {
-        Ok(message)
-    } else {
-        Err(Unreadable::Hash)
-    }
+    let parts = bytes.split_at_checked(HASH_BYTES);
+    let whole = parts.filter(|(hash, message)| Sha256::digest(message).as_slice() == *hash);
+    whole.map(|(_, message)| message).ok_or(Unreadable::Hash)
 }
 
 /// The records of one kind, each a file `{folder}/{id}`, and a file with the names of all. It is written after a new record, and before one
@@ -65,14 +53,12 @@ pub(crate) struct Records {
     max_bytes: u64,
 }
 
-/// The names of records.
 #[derive(Clone, PartialEq, Message)]
 struct Names {
     #[prost(string, repeated, tag = "1")]
     names: Vec<String>,
 }
 
-/// The ids of records at the start.
 #[derive(Debug)]
 pub(crate) struct RecordIds {
     /// All, those of lost records included.
@@ -91,7 +77,7 @@ pub(crate) struct NotCreated {
 }
 
 impl Records {
-    /// Those in a folder of files, of up to `max_bytes` each.
+    /// Of up to `max_bytes` each.
     pub(crate) fn new(files: Arc<SavedFiles>, folder: &'static str, max_bytes: u64) -> Self {
         Self {
             files,
@@ -100,32 +86,22 @@ impl Records {
         }
     }
 
-    /// An error of the start.
     pub(crate) fn error(&self, reason: &dyn fmt::Display) -> StoreError {
         self.files.error(reason)
     }
 
-    /// The ids of all records.
-    ///
-    /// # Errors
-    /// They cannot be read.
     pub(crate) async fn ids(&self) -> Result<RecordIds, StoreError> {
-        let read = async {
-            let files = self.files.list(self.folder).await?;
-            let known = self.names().await?;
-            Ok::<_, Error>(RecordIds {
-                files: files.len(),
-                all: files.into_keys().chain(known.iter().cloned()).collect(),
-                known,
-            })
-        };
-        read.await.map_err(|error| self.error(&error))
+        let failed = |error| self.error(&error);
+        let files = self.files.list(self.folder).await.map_err(failed)?;
+        let known = self.names().await.map_err(failed)?;
+        Ok(RecordIds {
+            files: files.len(),
+            all: files.into_keys().chain(known.iter().cloned()).collect(),
+            known,
+        })
     }
 
     /// Writes the names of records that had none.
-    ///
-    /// # Errors
-    /// They cannot be written.
     pub(crate) async fn adopt(&self, ids: &RecordIds) -> Result<(), StoreError> {
         if ids.all == ids.known {
             return Ok(());
@@ -134,10 +110,7 @@ impl Records {
         written.map_err(|error| self.error(&error))
     }
 
-    /// Reads a record, and makes something of its message.
-    ///
-    /// # Errors
-    /// It cannot be read; within, what is wrong with the record.
+    /// Reads a record, and makes something of its message. The inner error is what is wrong with the record.
     pub(crate) async fn read<T>(
         &self,
         id: &str,
@@ -147,69 +120,47 @@ impl Records {
     }
 
     /// Writes a record, new or in place of another.
-    ///
-    /// # Errors
-    /// [`ServiceError::StoreFailed`].
-    pub(crate) async fn write(&self, id: &str, record: Bytes) -> Result<(), ServiceError> {
-        let written = self.files.write(&self.path(id), record).await;
-        written.map_err(|error| failed(&error))
+    pub(crate) async fn write(&self, id: &str, record: Bytes) -> Result<(), Error> {
+        self.files.write(&self.path(id), record).await
     }
 
-    /// Writes a new record, and then the names of all; `before` writes what it needs.
-    ///
-    /// # Errors
-    /// Something cannot be written.
-    pub(crate) async fn create(
-        &self,
-        id: &str,
-        record: Bytes,
-        names: Vec<String>,
-        before: impl Future<Output = Result<(), Error>>,
-    ) -> Result<(), NotCreated> {
-        let path = self.path(id);
-        let written = async {
-            before.await?;
-            self.files.write(&path, record).await?;
-            self.write_names(names).await
-        };
-        let Err(error) = written.await else {
-            return Ok(());
-        };
-        failed(&error);
+    /// Writes a new record, and then the names of all.
+    pub(crate) async fn create(&self, id: &str, record: Bytes, names: Vec<String>) -> Result<(), NotCreated> {
+        let mut written = self.write(id, record).await;
+        if written.is_ok() {
+            written = self.write_names(names).await;
+        }
+        let Err(error) = written else { return Ok(()) };
+        log_failure(&error);
         // What a write that failed late left must not come back at the next start.
-        let undone = self.files.delete(&path).await;
-        let is_undone = undone.inspect_err(|error| _ = failed(error)).is_ok();
+        let undone = self.files.delete(&self.path(id)).await;
+        let is_undone = undone.inspect_err(log_failure).is_ok();
         Err(NotCreated { is_undone })
     }
 
-    /// Writes the names of all other records, and then deletes this one.
-    ///
-    /// # Errors
-    /// [`ServiceError::StoreFailed`]; then the record is as it was, or the next start adopts it.
-    pub(crate) async fn delete(&self, id: &str, mut others: Vec<String>) -> Result<(), ServiceError> {
-        let named = self.write_names(others.clone()).await;
-        named.map_err(|error| failed(&error))?;
-        if let Err(error) = self.files.delete(&self.path(id)).await {
+    /// Writes the names of all other records, and then deletes this one. After an error, the record is as it was, or the next start
+    /// adopts it.
+    pub(crate) async fn delete(&self, id: &str, mut others: Vec<String>) -> Result<(), Error> {
+        self.write_names(others.clone()).await?;
+        let deleted = self.files.delete(&self.path(id)).await;
+        if deleted.is_err() {
             others.push(id.to_owned());
             let _ = self.write_names(others).await;
-            return Err(failed(&error));
         }
-        Ok(())
+        deleted
     }
 
     /// The names that were last written; empty if they never were, or cannot be read.
     async fn names(&self) -> Result<BTreeSet<String>, Error> {
         let parse = |message: &[u8]| Names::decode(message).map_err(|_| Unreadable::Message);
         let file = self.names_path();
-        match self.read_file(&file, MAX_NAMES, parse).await? {
-            Ok(Names { names }) => Ok(names.into_iter().collect()),
-            Err(wrong) => {
-                if wrong != Unreadable::Missing {
-                    tracing::error!(%file, %wrong, "the names of what is saved are damaged: what is missing will not be missed");
-                }
-                Ok(BTreeSet::new())
-            }
+        let read = self.read_file(&file, MAX_NAMES, parse).await?;
+        if let Err(wrong) = read
+            && wrong != Unreadable::Missing
+        {
+            tracing::error!(%file, %wrong, "the names of what is saved are damaged: what is missing will not be missed");
         }
+        Ok(read.unwrap_or_default().names.into_iter().collect())
     }
 
     async fn write_names(&self, names: Vec<String>) -> Result<(), Error> {
@@ -234,6 +185,73 @@ impl Records {
     fn names_path(&self) -> Path {
         Path::from(format!("{}.names", self.folder))
     }
+}
+
+/// Where a field of an old message is now.
+#[derive(Debug)]
+pub(crate) struct FieldMove {
+    /// Its old number. If there are several of a number, they are for its first value, its second and so on.
+    old: usize,
+    /// The numbers of the messages that it is in now, and its own. Empty: its fields are of the whole message.
+    now: &'static [usize],
+    /// Its own fields, if they moved.
+    fields: &'static [FieldMove],
+}
+
+pub(crate) const fn field(old: usize, now: &'static [usize]) -> FieldMove {
+    message(old, now, &[])
+}
+
+pub(crate) const fn message(old: usize, now: &'static [usize], fields: &'static [FieldMove]) -> FieldMove {
+    FieldMove { old, now, fields }
+}
+
+/// A message with its fields where they are now. `None` if it is no message.
+pub(crate) fn move_fields(mut old: &[u8], moves: &[FieldMove]) -> Option<Vec<u8>> {
+    let (mut now, mut numbers) = (Vec::new(), Vec::new());
+    while !old.is_empty() {
+        let key = decode_length_delimiter(&mut old).ok()?;
+        let (number, wire_type) = (key >> 3, key & 7);
+        let mut rest = old;
+        let length = match wire_type {
+            0 => decode_length_delimiter(&mut rest).map(|_| 0).ok()?,
+            1 => 8,
+            5 => 4,
+            _ => decode_length_delimiter(&mut rest).ok()?,
+        };
+        let (mut content, rest) = rest.split_at_checked(length)?;
+        let value = &old[..old.len() - rest.len()];
+        old = rest;
+        let earlier = numbers.iter().filter(|earlier| **earlier == number).count();
+        numbers.push(number);
+        let places = moves.iter().filter(|to| to.old == number);
+        let Some(place) = places.take(earlier + 1).last() else {
+            continue;
+        };
+        let inner;
+        let mut value = value.to_vec();
+        if !place.fields.is_empty() {
+            inner = move_fields(content, place.fields)?;
+            content = &inner;
+            value = [&varint(content.len()), content].concat();
+        }
+        let [outer @ .., own] = place.now else {
+            now.extend(content);
+            continue;
+        };
+        value.splice(0..0, varint((own << 3) | wire_type));
+        for number in outer.iter().rev() {
+            value = [varint((number << 3) | 2), varint(value.len()), value].concat();
+        }
+        now.extend(value);
+    }
+    Some(now)
+}
+
+fn varint(number: usize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    encode_length_delimiter(number, &mut bytes).expect("a vector has room");
+    bytes
 }
 
 #[cfg(test)]

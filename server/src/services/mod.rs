@@ -99,7 +99,7 @@ impl Shared {
 
     /// The object with this id, ready for searches: loaded, if it was at rest, before the call's deadline.
     async fn object(&self, id: &str, call: &CallContext) -> Result<Revision, ServiceError> {
-        if let Some(revision) = self.objects.found(id).await?.loaded() {
+        if let Ok(revision) = self.objects.found(id).await?.loaded() {
             return Ok(revision);
         }
         let revision = before(call.answer_due(), self.objects.loaded(id)).await??;

@@ -20,7 +20,7 @@ use crate::{
     limits::MAX_PIECE,
     objects::{
         Listed,
-        glb::GlbPieces,
+        glb::glb_pieces,
         id_of, name_of,
         store::{Event, Report},
     },
@@ -149,7 +149,7 @@ impl Handler {
         let id = checked_id(name, object_id_of)?;
         call.log_object(&id);
         let revision = self.object(&id, call).await?;
-        let pieces = GlbPieces::new(Arc::clone(&revision.object));
+        let pieces = glb_pieces(&revision.object);
         let mut etag = Some(revision.record.etag.clone());
         Ok(lazy_messages(pieces.map(move |piece| v1::GetMeshResponse {
             piece,
@@ -169,7 +169,7 @@ impl Handler {
             loop {
                 match handler.objects.next_report(&watcher)? {
                     Some(report) => sender.send(handler.report(report)).await?,
-                    None => watcher.news().await,
+                    None => watcher.news.notified().await,
                 }
             }
         }))

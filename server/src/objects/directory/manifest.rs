@@ -12,17 +12,12 @@ use crate::{
     validate::{Field, Labels, Violations, quoted},
 };
 
-/// What hands do with a region.
-const REGION_PREFERENCES: [(&str, v1::Preference); 3] = [
-    ("preferred", v1::Preference::Preferred),
-    ("avoided", v1::Preference::Avoided),
-    ("forbidden", v1::Preference::Forbidden),
-];
+/// What hands do with a region, and what becomes of a grip.
+const REGION_PREFERENCES: &[&str] = &["preferred", "avoided", "forbidden"];
+const GRIP_PREFERENCES: &[&str] = &["preferred", "forbidden"];
 
-/// Reads a shape of one kind.
 type ReadKind = fn(&Keys<'_>) -> Kind;
 
-/// The kinds of shapes.
 const SHAPES: [(&str, ReadKind); 3] = [
     ("tube", |keys| {
         Kind::Tube(v1::TubeShape {
@@ -48,24 +43,10 @@ const SHAPES: [(&str, ReadKind); 3] = [
 const DIGITS: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 const ANGLES: [&str; 4] = ["base_yaw", "base_pitch", "second_pitch", "third_pitch"];
 
-/// What becomes of a grip.
-const GRIP_PREFERENCES: [(&str, v1::Preference); 2] = [
-    ("preferred", v1::Preference::Preferred),
-    ("forbidden", v1::Preference::Forbidden),
-];
+const HANDS: &[&str] = &["left", "right"];
 
-/// The hands.
-const HANDS: [(&str, v1::Handedness); 2] = [("left", v1::Handedness::Left), ("right", v1::Handedness::Right)];
-
-/// What a wrist may be given in.
-const CONVENTIONS: [(&str, v1::Convention); 6] = [
-    ("openxr", v1::Convention::Openxr),
-    ("unity", v1::Convention::Unity),
-    ("unreal", v1::Convention::Unreal),
-    ("godot", v1::Convention::Godot),
-    ("unity_flip_x", v1::Convention::UnityFlipX),
-    ("unreal_xzy", v1::Convention::UnrealXzy),
-];
+/// The conventions in which a wrist may be given.
+const CONVENTIONS: &[&str] = &["openxr", "unity", "unreal", "godot", "unity_flip_x", "unreal_xzy"];
 
 /// Mass in kilograms for further checks if none is given; no object gets it.
 const PLACEHOLDER_MASS: f32 = 1.0;
@@ -73,24 +54,18 @@ const PLACEHOLDER_MASS: f32 = 1.0;
 /// Reads the manifest of the object with this id key by key, to report everything that is wrong with it. Its values are not checked. None
 /// if it is not TOML.
 pub(super) fn read_manifest(id: &str, bytes: &[u8], violations: &Violations) -> Option<v1::GraspObject> {
-    let text = match std::str::from_utf8(bytes) {
-        Ok(text) => text,
-        Err(error) => {
-            violations.add("", format_args!("is not UTF-8: {error}"));
-            return None;
-        }
-    };
-    let table: Table = match text.parse() {
-        Ok(table) => table,
-        Err(error) => {
-            let error: toml::de::Error = error;
-            let line = error
-                .span()
-                .map_or(1, |span| 1 + text[..span.start].matches('\n').count());
-            violations.add("", format_args!("is not TOML: line {line}: {}", error.message()));
-            return None;
-        }
-    };
+    let whole = violations.field("");
+    let text = std::str::from_utf8(bytes);
+    let text = text
+        .map_err(|error| whole.add(format_args!("is not UTF-8: {error}")))
+        .ok()?;
+    let table = text.parse::<Table>().map_err(|error| {
+        let line = error
+            .span()
+            .map_or(1, |span| 1 + text[..span.start].matches('\n').count());
+        whole.add(format_args!("is not TOML: line {line}: {}", error.message()));
+    });
+    let table = table.ok()?;
     let keys = Keys::of(None, &table, violations);
     let mass = keys.required("mass_kg", "the mass in kilograms", number);
     let object = v1::GraspObject {
@@ -140,10 +115,10 @@ impl<'a> Keys<'a> {
     /// Adds a violation for every key that was not looked up.
     fn reject_others(&self) {
         let known = self.known.borrow();
+        let keys = known.join(", ");
         for key in self.table.keys().filter(|key| !known.contains(&key.as_str())) {
-            let keys = known.join(", ");
-            self.field(key)
-                .add(format_args!("is unknown; the keys are {keys}"));
+            let unknown = format_args!("is unknown; the keys are {keys}");
+            self.field(key).add(unknown);
         }
     }
 
@@ -161,10 +136,9 @@ impl<'a> Keys<'a> {
         needed: &str,
         read: impl FnOnce(At<'_>) -> Option<T>,
     ) -> Option<T> {
-        if !self.table.contains_key(key) {
-            self.field(key)
-                .add(format_args!("is missing; it must be {needed}"));
-        }
+        let is_there = self.table.contains_key(key);
+        self.field(key)
+            .check(is_there, format_args!("is missing; it must be {needed}"));
         self.optional(key, read)
     }
 
@@ -172,8 +146,14 @@ impl<'a> Keys<'a> {
         self.required(key, "a text", |at| at.text("a text"))
     }
 
-    fn required_word<T: Copy>(&self, key: &'static str, words: &[(&str, T)]) -> Option<T> {
-        self.required(key, &listed(words), |at| at.word(words))
+    fn required_word(&self, key: &'static str, prefix: &str, words: &[&str]) -> String {
+        let word = self.required(key, &listed(words), |at| at.word(prefix, words));
+        word.unwrap_or_default()
+    }
+
+    fn preference(&self, words: &[&str]) -> v1::Preference {
+        let name = self.required_word("preference", "PREFERENCE", words);
+        v1::Preference::from_str_name(&name).unwrap_or_default()
     }
 
     /// The elements of an array; none of them if one is wrong, because later violations would give wrong indices for the
@@ -211,10 +191,11 @@ impl At<'_> {
         text.or_else(|| self.reject(needed))
     }
 
-    fn word<T: Copy>(self, words: &[(&str, T)]) -> Option<T> {
-        let word = words.iter().find(|(word, _)| self.value.as_str() == Some(word));
-        word.map(|&(_, meaning)| meaning)
-            .or_else(|| self.reject(&listed(words)))
+    /// One of the words, as the contract has it: in capitals after a prefix.
+    fn word(self, prefix: &str, words: &[&str]) -> Option<String> {
+        let word = words.iter().find(|word| self.value.as_str() == Some(word));
+        let name = word.map(|word| format!("{prefix}_{}", word.to_uppercase()));
+        name.or_else(|| self.reject(&listed(words)))
     }
 
     /// A table that has none but the keys that `read` looks up, and nothing wrong in it.
@@ -255,8 +236,8 @@ impl At<'_> {
 }
 
 /// The words in quotes: `"a", "b" or "c"`.
-fn listed<T>(words: &[(&str, T)]) -> String {
-    let quoted: Vec<String> = words.iter().map(|(word, _)| format!("{word:?}")).collect();
+fn listed(words: &[&str]) -> String {
+    let quoted: Vec<String> = words.iter().map(|word| format!("{word:?}")).collect();
     match quoted.as_slice() {
         [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
         all => all.concat(),
@@ -280,10 +261,8 @@ fn group_name(at: At<'_>) -> Option<String> {
 }
 
 fn triangle_index(at: At<'_>) -> Option<u32> {
-    let index = at
-        .value
-        .as_integer()
-        .and_then(|number| u32::try_from(number).ok());
+    let number = at.value.as_integer();
+    let index = number.and_then(|number| u32::try_from(number).ok());
     index.or_else(|| at.reject("a triangle's number, counted from 0"))
 }
 
@@ -325,10 +304,7 @@ fn labels(at: At<'_>) -> Option<Labels> {
 fn region(at: At<'_>) -> Option<v1::Region> {
     at.table(|keys| v1::Region {
         name: keys.required_text("name").unwrap_or_default(),
-        preference: keys
-            .required_word("preference", &REGION_PREFERENCES)
-            .unwrap_or_default()
-            .into(),
+        preference: keys.preference(REGION_PREFERENCES).into(),
         weight: keys.optional("weight", number),
         groups: keys.list("groups", group_name),
         triangles: keys.list("triangles", triangle_index),
@@ -341,7 +317,8 @@ fn shape(at: At<'_>) -> Option<v1::Shape> {
     let given = given.and_then(|table| table.iter().next());
     let known = given.and_then(|(key, _)| SHAPES.iter().find(|(name, _)| name == key));
     let (Some((_, value)), Some((name, kind))) = (given, known) else {
-        return at.reject(&format!("a table with one of {}", listed(&SHAPES)));
+        let kinds = SHAPES.map(|(name, _)| name);
+        return at.reject(&format!("a table with one of {}", listed(&kinds)));
     };
     let field = at.field.child(name);
     // What is absent, and must not be, is reported with the checks of the request.
@@ -353,10 +330,7 @@ fn shape(at: At<'_>) -> Option<v1::Shape> {
 fn known_grip(at: At<'_>) -> Option<v1::KnownGrip> {
     at.table(|keys| v1::KnownGrip {
         name: keys.required_text("name").unwrap_or_default(),
-        preference: keys
-            .required_word("preference", &GRIP_PREFERENCES)
-            .unwrap_or_default()
-            .into(),
+        preference: keys.preference(GRIP_PREFERENCES).into(),
         hand: keys.required("hand", "a table with a hand", hand),
         near_distance: keys.optional("near_distance", number),
         near_angle: keys.optional("near_angle", number),
@@ -366,14 +340,16 @@ fn known_grip(at: At<'_>) -> Option<v1::KnownGrip> {
 fn hand(at: At<'_>) -> Option<v1::HandPose> {
     at.table(|keys| {
         let rig = keys.optional("rig", |at| at.text("the name of a rig"));
-        let handedness = keys.required_word("handedness", &HANDS);
+        let handedness =
+            v1::Handedness::from_str_name(&keys.required_word("handedness", "HANDEDNESS", HANDS));
         let hand = v1::HandPose {
             scale: keys.optional("scale", number),
             object_from_wrist: keys.optional("object_from_wrist", pose),
             ..v1::HandPose::new(rig.unwrap_or_default(), handedness.unwrap_or_default())
         };
         let hand = hand.with_digits(DIGITS.map(|key| keys.optional(key, digit)));
-        let convention = keys.optional("convention", |at| at.word(&CONVENTIONS));
+        let convention = keys.optional("convention", |at| at.word("CONVENTION", CONVENTIONS));
+        let convention = convention.and_then(|name| v1::Convention::from_str_name(&name));
         v1::HandPose {
             convention: convention.unwrap_or_default().into(),
             ..hand

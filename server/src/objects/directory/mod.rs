@@ -39,9 +39,7 @@ const LISTED_PROBLEMS: usize = 100;
 /// An object that the server starts with.
 #[derive(Debug)]
 pub(crate) struct PinnedObject {
-    /// The object.
     pub object: StoredObject,
-    /// Its labels.
     pub labels: Labels,
 }
 
@@ -78,12 +76,13 @@ pub struct DirectoryError {
 }
 
 fn listed(problems: &[DirectoryProblem]) -> String {
-    let listed = problems.iter().take(LISTED_PROBLEMS);
-    let mut lines: Vec<String> = listed.map(DirectoryProblem::to_string).collect();
-    if problems.len() > LISTED_PROBLEMS {
-        lines.push(format!("and {} more problems", problems.len() - LISTED_PROBLEMS));
-    }
-    lines.join("\n")
+    let listed = problems
+        .iter()
+        .take(LISTED_PROBLEMS)
+        .map(DirectoryProblem::to_string);
+    let more = problems.len().saturating_sub(LISTED_PROBLEMS);
+    let more = (more > 0).then(|| format!("and {more} more problems"));
+    listed.chain(more).collect::<Vec<_>>().join("\n")
 }
 
 /// What is wrong so far.
@@ -106,19 +105,19 @@ impl Problems {
             return self.add(&pair.mesh, error);
         };
         for Violation {
-            field, description, ..
+            field,
+            mut description,
+            ..
         } in violations
         {
-            let (file, field, description) = match field.as_str() {
-                "mesh" => (&pair.mesh, "", description),
+            let key = field.strip_prefix("object.").unwrap_or(&field);
+            let (file, field) = match field.as_str() {
+                "mesh" => (&pair.mesh, ""),
                 "object.name" => {
-                    let wrong = format!("is {}; it must be {ID_RULE}", quoted(&pair.id));
-                    (&pair.mesh, "the name", wrong)
+                    description = format!("is {}; it must be {ID_RULE}", quoted(&pair.id));
+                    (&pair.mesh, "the name")
                 }
-                field => {
-                    let key = field.strip_prefix("object.").unwrap_or(field);
-                    (&pair.toml, key, description)
-                }
+                _ => (&pair.toml, key),
             };
             self.0.push(DirectoryProblem {
                 file: file.clone(),
@@ -126,6 +125,11 @@ impl Problems {
                 description,
             });
         }
+    }
+
+    /// The value if there are no problems.
+    fn finish<T>(self, value: T) -> Result<T, Vec<DirectoryProblem>> {
+        if self.0.is_empty() { Ok(value) } else { Err(self.0) }
     }
 
     /// The bytes of a file, if it has no more than `limit`.
@@ -137,9 +141,6 @@ impl Problems {
 
 /// Reads the objects of a folder one after the other, so that loading takes no more memory than one upload in addition
 /// to the objects themselves.
-///
-/// # Errors
-/// Everything that is wrong, in the order of the file names.
 pub(crate) fn load(
     path: &Path,
     limits: MeshLimits,
@@ -166,14 +167,10 @@ pub(crate) fn load(
         }
         objects.push(object);
     }
-    if problems.0.is_empty() {
-        Ok(objects)
-    } else {
-        Err(DirectoryError {
-            path: path.to_owned(),
-            problems: problems.0,
-        })
-    }
+    problems.finish(objects).map_err(|problems| DirectoryError {
+        path: path.to_owned(),
+        problems,
+    })
 }
 
 /// A mesh of a folder.
@@ -208,22 +205,18 @@ pub fn objects_of_folder(path: &Path) -> Result<Vec<FolderObject>, Vec<Directory
             manifest,
         });
     }
-    if problems.0.is_empty() {
-        Ok(objects)
-    } else {
-        Err(problems.0)
-    }
+    problems.finish(objects)
 }
 
 /// Reads one object. `None` if something is wrong with it.
 fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits, problems: &mut Problems) -> Option<PinnedObject> {
     let before = problems.0.len();
     if !pair.has_manifest {
-        let missing = format_args!(
-            "has no {} next to it, which must give at least mass_kg",
-            pair.toml
+        let toml = &pair.toml;
+        problems.add(
+            &pair.mesh,
+            format_args!("has no {toml} next to it, which must give at least mass_kg"),
         );
-        problems.add(&pair.mesh, missing);
         return None;
     }
     let manifest = problems.read(path, &pair.toml, BYTES_BESIDES_MESH);
@@ -298,26 +291,23 @@ const MANIFEST: &str = "toml";
 /// Other files (pictures, material libraries, notes) are ignored, and so are names that start with a dot, which volumes
 /// of container platforms contain.
 fn pairs(path: &Path, maximum: usize, problems: &mut Problems) -> Vec<Pair> {
-    let names = match read_names(path, problems) {
-        Ok(names) => names,
-        Err(error) => {
-            let needed = "it must be a folder that the server may read";
-            problems.add("", format_args!("{error}; {needed}"));
-            return Vec::new();
-        }
-    };
-    if names.len() > maximum {
-        let count = names.len();
+    let names = read_names(path, problems).unwrap_or_else(|error| {
         problems.add(
             "",
-            format_args!("it has {count} objects; the limit is cache_objects, {maximum}"),
+            format_args!("{error}; it must be a folder that the server may read"),
         );
+        BTreeMap::new()
+    });
+    let count = names.len();
+    if count > maximum {
+        let limit = format_args!("it has {count} objects; the limit is cache_objects, {maximum}");
+        problems.add("", limit);
         return Vec::new();
     }
     let mut pairs = Vec::new();
     for (id, extensions) in names {
         let toml = format!("{id}.{MANIFEST}");
-        let meshes = extensions.iter().filter(|extension| **extension != MANIFEST);
+        let meshes = MESHES.iter().filter(|mesh| extensions.contains(*mesh));
         let mut meshes = meshes.map(|extension| format!("{id}.{extension}"));
         let Some(mesh) = meshes.next() else {
             let all = MESHES.join(&format!(", {id}."));

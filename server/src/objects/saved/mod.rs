@@ -28,12 +28,11 @@ use prost::Message;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use uuid::Uuid;
 
-use self::version_0_1::Record01;
 use super::{Record, StoredObject, id_of, name_of};
 use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
-    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, failed, seal},
+    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, seal},
     validate::{Labels, RequestKey},
     wire::hex,
 };
@@ -54,7 +53,7 @@ pub(crate) type MeshHash = [u8; 32];
 #[derive(Debug)]
 pub(crate) struct SavedObjects {
     files: Arc<SavedFiles>,
-    records: Records,
+    pub records: Records,
     /// Largest number of objects.
     pub maximum: usize,
     /// Bounds on meshes.
@@ -70,11 +69,8 @@ pub(crate) struct SavedObjects {
 /// What was found at the start.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
-    /// The records by id, without regions and known grips.
-    pub objects: Vec<(String, SavedObject)>,
-    /// Ids of the objects whose records are damaged or missing.
-    pub damaged: Vec<String>,
-    /// How many records name each mesh.
+    /// The records by id, without regions and known grips; `None` if damaged or missing.
+    pub objects: Vec<(String, Option<SavedObject>)>,
     pub mesh_uses: MeshUses,
 }
 
@@ -82,8 +78,7 @@ pub(crate) struct Found {
 pub(crate) type MeshUses = HashMap<MeshHash, usize>;
 
 impl SavedObjects {
-    /// The objects of these files, at most `maximum`, of which so many are loaded at a time, with mesh files of
-    /// `limits.bytes` together and thus each.
+    /// At most `maximum`, of which so many are loaded at a time, with mesh files of `limits.bytes` together and thus each.
     pub(crate) fn new(
         files: Arc<SavedFiles>,
         maximum: NonZeroUsize,
@@ -101,39 +96,28 @@ impl SavedObjects {
         }
     }
 
-    /// Reads every record, and removes meshes that no record names.
-    ///
-    /// # Errors
-    /// Something cannot be read, or all records or meshes are missing.
+    /// Reads every record, and removes meshes that no record names. An error if all records or meshes are missing.
     pub(crate) async fn read_all(&self) -> Result<Found, StoreError> {
         let failed = |error| self.files.error(&error);
-        let meshes: HashMap<String, u64> = self.files.list(MESHES).await.map_err(failed)?;
+        let meshes = self.files.list(MESHES).await.map_err(failed)?;
         let ids = self.records.ids().await?;
         if ids.files == 0 {
             self.check_lost(OBJECTS, ids.known.len(), "records").await?;
         }
-        let read = ids
-            .all
-            .iter()
-            .cloned()
-            .map(|id| async move { Ok::<_, Error>((self.readable_record(&id).await?, id)) });
+        let read = ids.all.iter().cloned();
+        let read = read.map(|id| async move { Ok((self.record(&id).await?, id)) });
         let mut read = futures_util::stream::iter(read).buffer_unordered(READ_AT_A_TIME);
         let mut found = Found::default();
         while let Some((saved, id)) = read.try_next().await.map_err(failed)? {
-            match saved {
-                Ok(saved) => {
-                    let hash = saved.mesh_hash();
-                    if meshes.get(&hex(&hash)) != Some(&saved.mesh_bytes) {
-                        log_damage(&id, &"its mesh is missing or has another size");
-                    }
-                    *found.mesh_uses.entry(hash).or_default() += 1;
-                    found.objects.push((id, saved.without_lists()));
+            let saved = saved.inspect_err(|wrong| log_damage(&id, wrong)).ok();
+            if let Some(saved) = &saved {
+                let hash = saved.mesh_hash();
+                if meshes.get(&hex(&hash)) != Some(&saved.mesh_bytes) {
+                    log_damage(&id, &"its mesh is missing or has another size");
                 }
-                Err(wrong) => {
-                    log_damage(&id, &wrong);
-                    found.damaged.push(id);
-                }
+                *found.mesh_uses.entry(hash).or_default() += 1;
             }
+            found.objects.push((id, saved.map(SavedObject::without_lists)));
         }
         drop(read);
         let used: HashSet<String> = found.mesh_uses.keys().map(|hash| hex(hash)).collect();
@@ -141,10 +125,9 @@ impl SavedObjects {
             self.check_lost(MESHES, used.len(), "meshes").await?;
         }
         // With its mesh, a damaged record may still be replaced.
-        let unused = meshes
-            .keys()
-            .filter(|mesh| found.damaged.is_empty() && !used.contains(*mesh));
-        for mesh in unused {
+        let are_whole = found.objects.iter().all(|(_, saved)| saved.is_some());
+        let unused = |mesh: &String| are_whole && !used.contains(mesh);
+        for mesh in meshes.into_keys().filter(unused) {
             let path = Path::from_iter([MESHES, mesh.as_str()]);
             self.files.delete(&path).await.map_err(failed)?;
         }
@@ -168,34 +151,22 @@ impl SavedObjects {
     }
 
     /// Writes a new object: its mesh, its record, and then the names of all.
-    ///
-    /// # Errors
-    /// Something cannot be written.
     pub(crate) async fn create(
         &self,
         saved: &SavedObject,
         mesh: Bytes,
         names: Vec<String>,
     ) -> Result<(), NotCreated> {
-        let path = mesh_path(&saved.mesh_hash());
-        let mesh = self.files.write(&path, mesh);
-        self.records.create(saved.id(), seal(saved), names, mesh).await
+        let written = self.files.write(&mesh_path(&saved.mesh_hash()), mesh).await;
+        if written.map_err(ServiceError::from).is_err() {
+            return Err(NotCreated { is_undone: true });
+        }
+        self.records.create(saved.id(), seal(saved), names).await
     }
 
     /// Writes the record of an object that has one.
-    ///
-    /// # Errors
-    /// [`ServiceError::StoreFailed`].
-    pub(crate) async fn write(&self, saved: &SavedObject) -> Result<(), ServiceError> {
+    pub(crate) async fn write(&self, saved: &SavedObject) -> Result<(), Error> {
         self.records.write(saved.id(), seal(saved)).await
-    }
-
-    /// Deletes a record, whose name is not among the `others`.
-    ///
-    /// # Errors
-    /// [`ServiceError::StoreFailed`].
-    pub(crate) async fn delete_record(&self, id: &str, others: Vec<String>) -> Result<(), ServiceError> {
-        self.records.delete(id, others).await
     }
 
     /// Deletes a mesh that no record names any more. If that fails, the next start does it.
@@ -205,46 +176,32 @@ impl SavedObjects {
         }
     }
 
-    /// The record of an object.
-    ///
-    /// # Errors
-    /// [`ServiceError::StoreFailed`]; within, what is wrong with it.
-    pub(crate) async fn record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, ServiceError> {
-        let read = self.readable_record(id).await;
-        read.map_err(|error| failed(&error))
+    /// The record of an object. The inner error is what is wrong with it.
+    pub(crate) async fn record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, Error> {
+        let parse = |message: &[u8]| SavedObject::from_message(id, message);
+        self.records.read(id, parse).await
     }
 
     /// The mesh file of an object, to be compared with its hash, and room for it until the permit is dropped. `None` if it is
-    /// missing.
-    ///
-    /// # Errors
-    /// [`ServiceError::StoreFailed`], [`ServiceError::ObjectUnloadable`] if it is too large.
+    /// missing. [`ServiceError::ObjectUnloadable`] if it is too large.
     pub(crate) async fn mesh(
         &self,
         saved: &SavedObject,
     ) -> Result<(Option<Bytes>, OwnedSemaphorePermit), ServiceError> {
-        if saved.mesh_bytes > self.limits.bytes as u64 {
+        let (bytes, limit) = (saved.mesh_bytes, self.limits.bytes);
+        if bytes > limit as u64 {
             return Err(ServiceError::ObjectUnloadable {
                 name: name_of(saved.id()),
-                reason: format!(
-                    "its mesh has {} bytes; the limit is {}",
-                    saved.mesh_bytes, self.limits.bytes
-                ),
+                reason: format!("its mesh has {bytes} bytes; the limit is {limit}"),
             });
         }
-        let permits = (saved.mesh_bytes as usize).div_ceil(BYTES_PER_PERMIT) as u32;
+        let permits = (bytes as usize).div_ceil(BYTES_PER_PERMIT) as u32;
         let acquired = Arc::clone(&self.load_bytes).acquire_many_owned(permits).await;
         let room = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        let read = self
-            .files
-            .read(&mesh_path(&saved.mesh_hash()), saved.mesh_bytes)
-            .await;
-        Ok((read.map_err(|error| failed(&error))?, room))
-    }
-
-    async fn readable_record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, Error> {
-        let parse = |message: &[u8]| SavedObject::from_message(id, message);
-        self.records.read(id, parse).await
+        Ok((
+            self.files.read(&mesh_path(&saved.mesh_hash()), bytes).await?,
+            room,
+        ))
     }
 }
 
@@ -272,7 +229,6 @@ pub(crate) struct SavedObject {
 }
 
 impl SavedObject {
-    /// The record of an object that a client creates.
     pub(crate) fn new(
         object: &StoredObject,
         record: &Record,
@@ -361,9 +317,8 @@ impl SavedObject {
     fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
         let mut saved = Self::decode(message).map_err(|_| Unreadable::Message)?;
         if saved.object.name.is_empty() {
-            let old = Record01::decode(message).map_err(|_| Unreadable::Message)?;
-            saved.given_centre_of_mass = old.given_centre_of_mass();
-            saved.object = old.into();
+            let old = version_0_1::read(message).ok_or(Unreadable::Message)?;
+            (saved.object, saved.given_centre_of_mass) = old;
         }
         let is_complete = saved.mesh_sha256.len() == size_of::<MeshHash>()
             && saved.record().is_some()

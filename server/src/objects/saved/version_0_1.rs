@@ -1,11 +1,13 @@
-//! Records as version 0.1 wrote them, which are read, but not written.
+//! Records as version 0.1 wrote them, which are read, but not written: most of their fields are in others' places now.
 
-use std::collections::BTreeMap;
+use grasp_proto::v1;
+use prost::Message;
 
-use grasp_proto::v1::{self, shape::Kind};
-use prost::{Message, Oneof};
-
-use crate::{objects::name_of, rigs};
+use crate::{
+    objects::name_of,
+    rigs,
+    saved::{FieldMove, field, message, move_fields},
+};
 
 /// The name of the region that was a list of its own.
 const FORBIDDEN: &str = "forbidden";
@@ -13,56 +15,97 @@ const FORBIDDEN: &str = "forbidden";
 /// The number of the axis z that points up.
 const Z_UP: i32 = 2;
 
-/// What hands do with a region, and with a grip, in the order of the numbers in records.
-const REGION_USES: [v1::Preference; 4] = [
-    v1::Preference::Unspecified,
-    v1::Preference::Forbidden,
-    v1::Preference::Avoided,
-    v1::Preference::Preferred,
-];
-const GRIP_USES: [v1::Preference; 3] = [
-    v1::Preference::Unspecified,
-    v1::Preference::Preferred,
-    v1::Preference::Forbidden,
+const OBJECT: &[FieldMove] = &[
+    message(1, &[], GIVEN),
+    field(6, &[2]),
+    field(7, &[19]),
+    field(8, &[20]),
+    message(9, &[], FOUND),
 ];
 
-fn preference_of(number: i32, uses: &[v1::Preference]) -> v1::Preference {
-    let used = usize::try_from(number).ok().and_then(|number| uses.get(number));
-    used.copied().unwrap_or_default()
-}
+const GIVEN: &[FieldMove] = &[
+    field(1, &[1]),
+    field(3, &[9]),
+    field(4, &[4]),
+    field(6, &[6]),
+    message(7, &[7], FORBIDDEN_LIST),
+    field(10, &[3]),
+    message(12, &[7], REGION),
+    message(13, &[8], GRIP),
+    field(14, &[11]),
+];
 
-/// The fields of a record that are others now.
+const FOUND: &[FieldMove] = &[
+    field(3, &[13]),
+    field(6, &[5]),
+    field(8, &[14]),
+    field(9, &[15, 1]),
+    field(10, &[15, 2]),
+    field(11, &[16]),
+    field(12, &[17]),
+];
+
+const FORBIDDEN_LIST: &[FieldMove] = &[field(1, &[4]), field(2, &[5])];
+
+const REGION: &[FieldMove] = &[
+    field(1, &[1]),
+    field(2, &[2]),
+    field(3, &[3]),
+    field(4, &[4]),
+    field(5, &[5]),
+    message(6, &[6], SHAPE),
+];
+
+/// A ball, a box, a half-space or a tube. A ball's centre and radius had the numbers of the points and radii of a tube.
+const SHAPE: &[FieldMove] = &[
+    field(1, &[1]),
+    field(2, &[2]),
+    field(3, &[3]),
+    message(4, &[1], &[field(1, &[1]), field(2, &[2]), field(3, &[2])]),
+];
+
+/// The digits, thumb first, were a list before each had a field.
+const GRIP: &[FieldMove] = &[
+    field(1, &[1]),
+    field(2, &[2]),
+    field(3, &[3, 1]),
+    field(4, &[3, 2]),
+    field(5, &[3, 3]),
+    field(6, &[3, 5]),
+    field(7, &[3, 6]),
+    field(7, &[3, 7]),
+    field(7, &[3, 8]),
+    field(7, &[3, 9]),
+    field(7, &[3, 10]),
+    field(8, &[4]),
+    field(9, &[5]),
+    field(10, &[3, 11]),
+    field(11, &[3, 6]),
+    field(12, &[3, 7]),
+    field(13, &[3, 8]),
+    field(14, &[3, 9]),
+    field(15, &[3, 10]),
+];
+
+/// The fields that are in no other's place now.
 #[derive(Clone, PartialEq, Message)]
-pub(super) struct Record01 {
+struct OldRecord {
     #[prost(message, required, tag = "1")]
-    fields: Fields,
-    #[prost(string, tag = "6")]
-    etag: String,
-    #[prost(message, required, tag = "7")]
-    created: prost_types::Timestamp,
-    #[prost(message, required, tag = "8")]
-    updated: prost_types::Timestamp,
+    given: OldFields,
     #[prost(message, required, tag = "9")]
-    findings: Findings,
+    found: OldFindings,
 }
 
-/// What was computed from the mesh.
-#[derive(Clone, PartialEq, Message)]
-struct Findings {
-    #[prost(uint32, tag = "3")]
-    triangle_count: u32,
-    #[prost(message, optional, tag = "6")]
+#[derive(Clone, Copy, PartialEq, Message)]
+struct OldFields {
+    #[prost(message, optional, tag = "5")]
     centre_of_mass: Option<v1::Vector3>,
-    #[prost(uint32, tag = "8")]
-    forbidden_triangle_count: u32,
-    #[prost(message, optional, tag = "9")]
-    object_from_box: Option<v1::Pose>,
-    #[prost(message, optional, tag = "10")]
-    box_half_extents: Option<v1::Vector3>,
-    #[prost(string, tag = "11")]
-    content_hash: String,
-    #[prost(string, repeated, tag = "12")]
-    warnings: Vec<String>,
+    #[prost(int32, tag = "9")]
+    up_axis: i32,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+struct OldFindings {
     #[prost(message, optional, tag = "14")]
     origin_in_file: Option<Origin>,
 }
@@ -77,276 +120,75 @@ struct Origin {
     z: f64,
 }
 
-/// What a client gives an object.
-#[derive(Clone, PartialEq, Message)]
-struct Fields {
-    #[prost(string, tag = "1")]
-    id: String,
-    #[prost(float, optional, tag = "3")]
-    metres_per_unit: Option<f32>,
-    #[prost(float, tag = "4")]
-    mass: f32,
-    #[prost(message, optional, tag = "5")]
-    centre_of_mass: Option<v1::Vector3>,
-    #[prost(float, optional, tag = "6")]
-    friction: Option<f32>,
-    #[prost(message, optional, tag = "7")]
-    forbidden: Option<Forbidden>,
-    #[prost(int32, tag = "9")]
-    up_axis: i32,
-    #[prost(btree_map = "string, string", tag = "10")]
-    labels: BTreeMap<String, String>,
-    #[prost(message, repeated, tag = "12")]
-    regions: Vec<Region>,
-    #[prost(message, repeated, tag = "13")]
-    known_grips: Vec<Grip>,
-    #[prost(string, repeated, tag = "14")]
-    parts: Vec<String>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Forbidden {
-    #[prost(string, repeated, tag = "1")]
-    groups: Vec<String>,
-    #[prost(uint32, repeated, tag = "2")]
-    triangles: Vec<u32>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Region {
-    #[prost(string, tag = "1")]
-    name: String,
-    #[prost(int32, tag = "2")]
-    used: i32,
-    #[prost(float, optional, tag = "3")]
-    weight: Option<f32>,
-    #[prost(string, repeated, tag = "4")]
-    groups: Vec<String>,
-    #[prost(uint32, repeated, tag = "5")]
-    triangles: Vec<u32>,
-    #[prost(message, repeated, tag = "6")]
-    shapes: Vec<Shape>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Shape {
-    #[prost(oneof = "ShapeKind", tags = "1, 2, 3, 4")]
-    kind: Option<ShapeKind>,
-}
-
-#[derive(Clone, PartialEq, Oneof)]
-enum ShapeKind {
-    /// A ball, whose centre and radius are numbered as the point and the radius of a tube.
-    #[prost(message, tag = "1")]
-    Ball(v1::TubeShape),
-    #[prost(message, tag = "2")]
-    Box(v1::BoxShape),
-    #[prost(message, tag = "3")]
-    HalfSpace(v1::HalfSpaceShape),
-    #[prost(message, tag = "4")]
-    Tube(Tube),
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Tube {
-    #[prost(message, repeated, tag = "1")]
-    points: Vec<v1::Vector3>,
-    #[prost(float, tag = "2")]
-    radius: f32,
-    #[prost(float, repeated, tag = "3")]
-    radii: Vec<f32>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Grip {
-    #[prost(string, tag = "1")]
-    name: String,
-    #[prost(int32, tag = "2")]
-    used: i32,
-    #[prost(string, tag = "3")]
-    rig: String,
-    #[prost(enumeration = "v1::Handedness", tag = "4")]
-    side: i32,
-    #[prost(float, optional, tag = "5")]
-    scale: Option<f32>,
-    /// Absent: the identity.
-    #[prost(message, optional, tag = "6")]
-    object_from_wrist: Option<v1::Pose>,
-    /// All digits, thumb first, or none.
-    #[prost(message, repeated, tag = "7")]
-    digits: Vec<v1::DigitAngles>,
-    #[prost(float, optional, tag = "8")]
-    near_distance: Option<f32>,
-    #[prost(float, optional, tag = "9")]
-    near_angle: Option<f32>,
-    #[prost(enumeration = "v1::Convention", tag = "10")]
-    convention: i32,
-    #[prost(message, optional, tag = "11")]
-    thumb: Option<v1::DigitAngles>,
-    #[prost(message, optional, tag = "12")]
-    index: Option<v1::DigitAngles>,
-    #[prost(message, optional, tag = "13")]
-    middle: Option<v1::DigitAngles>,
-    #[prost(message, optional, tag = "14")]
-    ring: Option<v1::DigitAngles>,
-    #[prost(message, optional, tag = "15")]
-    little: Option<v1::DigitAngles>,
-}
-
-impl Record01 {
-    /// The centre of mass that the client gave.
-    pub(super) fn given_centre_of_mass(&self) -> Option<v1::Vector3> {
-        self.fields.centre_of_mass
-    }
-}
-
-impl From<Record01> for v1::GraspObject {
-    fn from(record: Record01) -> Self {
-        let (given, found) = (record.fields, record.findings);
-        let mut regions: Vec<v1::Region> = given.regions.into_iter().map(Into::into).collect();
-        if let Some(forbidden) = given.forbidden.filter(|list| *list != Forbidden::default()) {
-            let mut name = FORBIDDEN.to_owned();
-            for number in 2.. {
-                if regions.iter().all(|region| region.name != name) {
-                    break;
-                }
-                name = format!("{FORBIDDEN} {number}");
-            }
-            regions.push(v1::Region {
-                groups: forbidden.groups,
-                triangles: forbidden.triangles,
-                ..v1::Region::new(name, v1::Preference::Forbidden)
-            });
-        }
-        let origin = found.origin_in_file.map(|Origin { x, y, z }| vec![x, y, z]);
-        Self {
-            name: name_of(&given.id),
-            etag: record.etag,
-            create_time: Some(record.created),
-            update_time: Some(record.updated),
-            labels: given.labels,
-            mass_kg: given.mass,
-            friction: given.friction,
-            regions,
-            known_grips: given.known_grips.into_iter().map(Into::into).collect(),
-            meters_per_unit: given.metres_per_unit.or(Some(1.0)),
-            z_up: given.up_axis == Z_UP,
-            parts: given.parts,
-            center_of_mass: found.centre_of_mass,
-            triangle_count: found.triangle_count,
-            forbidden_triangle_count: found.forbidden_triangle_count,
-            bounding_box: Some(v1::BoxShape {
-                pose: found.object_from_box,
-                half_extents: found.box_half_extents,
-            }),
-            content_hash: found.content_hash,
-            warnings: found.warnings,
-            origin_in_file: origin.unwrap_or_default(),
-            ..Self::default()
-        }
-    }
-}
-
-impl From<Region> for v1::Region {
-    fn from(region: Region) -> Self {
-        let preference = preference_of(region.used, &REGION_USES);
-        Self {
-            name: region.name,
-            preference: preference.into(),
-            weight: region.weight,
-            groups: region.groups,
-            triangles: region.triangles,
-            shapes: region.shapes.into_iter().map(Into::into).collect(),
-        }
-    }
-}
-
-impl From<Shape> for v1::Shape {
-    fn from(shape: Shape) -> Self {
-        let kind = shape.kind.map(|kind| match kind {
-            ShapeKind::Ball(ball) => Kind::Tube(ball),
-            ShapeKind::Box(solid) => Kind::Box(solid),
-            ShapeKind::HalfSpace(half) => Kind::HalfSpace(half),
-            ShapeKind::Tube(tube) => Kind::Tube(v1::TubeShape {
-                points: tube.points,
-                radii: if tube.radii.is_empty() {
-                    vec![tube.radius]
-                } else {
-                    tube.radii
-                },
-            }),
-        });
-        Self { kind }
-    }
-}
-
-impl From<Grip> for v1::KnownGrip {
-    fn from(grip: Grip) -> Self {
-        let preference = preference_of(grip.used, &GRIP_USES);
-        let convention = match grip.convention() {
-            v1::Convention::Unspecified => v1::Convention::Openxr,
-            given => given,
+/// The object of an old record, and the centre of mass that its client gave.
+pub(super) fn read(record: &[u8]) -> Option<(v1::GraspObject, Option<v1::Vector3>)> {
+    let OldRecord { given, found } = OldRecord::decode(record).ok()?;
+    let mut object = v1::GraspObject::decode(&*move_fields(record, OBJECT)?).ok()?;
+    object.name = name_of(&object.name);
+    object.meters_per_unit.get_or_insert(1.0);
+    object.z_up = given.up_axis == Z_UP;
+    let origin = found.origin_in_file.map(|Origin { x, y, z }| vec![x, y, z]);
+    object.origin_in_file = origin.unwrap_or_default();
+    for region in &mut object.regions {
+        // What is preferred and what is forbidden had each other's numbers.
+        region.preference = if region.preference == 0 {
+            0
+        } else {
+            4 - region.preference
         };
-        let listed = |place: usize| grip.digits.get(place).copied();
-        let digits = [grip.thumb, grip.index, grip.middle, grip.ring, grip.little];
-        let digits = std::array::from_fn(|place| digits[place].or(listed(place)));
+    }
+    let forbidden = object.regions.iter().position(|region| region.name.is_empty());
+    if let Some(place) = forbidden {
+        let mut list = object.regions.remove(place);
+        let mut numbers = 2..;
+        FORBIDDEN.clone_into(&mut list.name);
+        while object.regions.iter().any(|region| region.name == list.name) {
+            list.name = format!("{FORBIDDEN} {}", numbers.next().unwrap_or_default());
+        }
+        list.set_preference(v1::Preference::Forbidden);
+        if !list.groups.is_empty() || !list.triangles.is_empty() {
+            object.regions.push(list);
+        }
+    }
+    for grip in &mut object.known_grips {
+        if grip.preference == 2 {
+            grip.set_preference(v1::Preference::Forbidden);
+        }
+        let hand = grip.hand.get_or_insert_default();
+        hand.object_from_wrist.get_or_insert_default();
+        if hand.convention == 0 {
+            hand.set_convention(v1::Convention::Openxr);
+        }
         // Built-in rigs had no prefix.
-        let rig = match grip.rig.as_str() {
-            "" => String::new(),
-            rig if rig.starts_with(rigs::COLLECTION) => rig.to_owned(),
-            rig => rigs::name_of(rig),
-        };
-        let hand = v1::HandPose {
-            scale: grip.scale,
-            object_from_wrist: Some(grip.object_from_wrist.unwrap_or_default()),
-            convention: convention.into(),
-            ..v1::HandPose::new(rig, grip.side())
-        };
-        Self {
-            near_distance: grip.near_distance,
-            near_angle: grip.near_angle,
-            ..Self::new(grip.name, preference, hand.with_digits(digits))
+        if !hand.rig.is_empty() && !hand.rig.starts_with(rigs::COLLECTION) {
+            hand.rig = rigs::name_of(&hand.rig);
         }
     }
+    Some((object, given.centre_of_mass))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn read(fields: Fields) -> v1::GraspObject {
-        let record = Record01 {
-            fields,
-            ..Default::default()
-        };
-        record.into()
+    /// A field of a message, or a text.
+    fn bytes(number: u8, content: &[u8]) -> Vec<u8> {
+        [&[(number << 3) | 2, content.len() as u8], content].concat()
     }
 
     #[test]
     fn a_list_of_forbidden_surfaces_becomes_a_region_of_a_free_name() {
-        let named = |name: &str| Region {
-            name: name.to_owned(),
-            ..Default::default()
-        };
-        let fields = Fields {
-            forbidden: Some(Forbidden {
-                groups: vec!["rim".to_owned()],
-                triangles: vec![7],
-            }),
-            regions: vec![named("forbidden"), named("forbidden 2")],
-            ..Default::default()
-        };
-        let regions = read(fields).regions;
+        let named = |name: &str| bytes(12, &bytes(1, name.as_bytes()));
+        let list = bytes(7, &[bytes(1, b"rim"), bytes(2, &[7])].concat());
+        let given = [list, named("forbidden"), named("forbidden 2")].concat();
+        let regions = read(&bytes(1, &given)).unwrap().0.regions;
         let region = v1::Region {
             groups: vec!["rim".to_owned()],
             triangles: vec![7],
             ..v1::Region::new("forbidden 3", v1::Preference::Forbidden)
         };
         assert_eq!((regions.len(), &regions[2]), (3, &region));
-        let none = Fields {
-            forbidden: Some(Forbidden::default()),
-            ..Default::default()
-        };
-        assert!(read(none).regions.is_empty());
+        let empty = read(&bytes(1, &bytes(7, b""))).unwrap();
+        assert!(empty.0.regions.is_empty());
     }
 }

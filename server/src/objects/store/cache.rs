@@ -26,21 +26,17 @@ pub(super) const KEPT_AHEAD: usize = 32;
 /// Where an object at another size is kept once it is prepared.
 pub(crate) type SizeSlot = Arc<OnceLock<Arc<StoredObject>>>;
 
-/// Why something is derived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Need {
-    /// A call waits for it.
     Call,
     /// A call may ask for it soon, or an atlas grows from it.
     Ahead,
 }
 
-/// What is made from an object.
 #[derive(Clone, Debug)]
 enum Product {
     /// What searches need of it.
     Derived,
-    /// The object at another size.
     Size(ObjectSize, SizeSlot),
     /// The atlas for a hand, and what was learned.
     Atlas(Arc<Hand>),
@@ -57,7 +53,6 @@ impl Product {
     }
 }
 
-/// Something in the cache that can be made again.
 #[derive(Debug)]
 pub(super) struct Item {
     of: Weak<StoredObject>,
@@ -99,7 +94,6 @@ impl Item {
         }
     }
 
-    /// True if it makes room for something in this demand.
     fn yields_to(&self, demand: Demand) -> bool {
         match self.product {
             Product::Atlas(_) => self.demand().cmp(demand).is_lt(),
@@ -118,8 +112,6 @@ impl Item {
 #[derive(Debug, Default)]
 pub(super) struct Cache {
     items: Vec<Item>,
-    /// The sum of their sizes.
-    bytes: usize,
 }
 
 impl Cache {
@@ -129,7 +121,6 @@ impl Cache {
     }
 
     fn add(&mut self, object: &Arc<StoredObject>, product: Product, bytes: usize, last_used: u64) {
-        self.bytes += bytes;
         self.items.push(Item {
             of: Arc::downgrade(object),
             product,
@@ -140,7 +131,6 @@ impl Cache {
 
     pub(super) fn retain(&mut self, stays: impl Fn(&Item) -> bool) {
         self.items.retain(stays);
-        self.bytes = self.items.iter().map(|item| item.bytes).sum();
     }
 
     /// Forgets what was made from an object that is changed or gone.
@@ -157,12 +147,9 @@ impl Cache {
             (a_atlas, a_used).cmp(&(b_atlas, b_used)).then(a.cmp(*b))
         });
         let Some((_, place)) = first else { return false };
-        let Item {
-            of, product, bytes, ..
-        } = self.items.remove(place);
-        self.bytes -= bytes;
-        if let Some(object) = of.upgrade() {
-            match product {
+        let item = self.items.remove(place);
+        if let Some(object) = item.of.upgrade() {
+            match item.product {
                 Product::Derived => object.derived.forget(),
                 Product::Size(..) => {}
                 Product::Atlas(hand) => {
@@ -222,9 +209,6 @@ impl ObjectStore {
 
     /// Makes room for so many more bytes and objects that a call needs: all that is not in use goes but the object with the id
     /// `kept`.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if what would have to make room is in use.
     fn make_room(
         &self,
         created: &mut Created,
@@ -282,9 +266,6 @@ impl ObjectStore {
     }
 
     /// Checks that a new object fits in the cache with what will be derived from it.
-    ///
-    /// # Errors
-    /// [`ServiceError::Invalid`].
     pub(crate) fn check_size(&self, object: &StoredObject) -> Result<(), ServiceError> {
         let whole = object.derived_and_own_bytes();
         if whole > self.limits.bytes {
@@ -310,9 +291,8 @@ impl ObjectStore {
     /// there is room. An object that the server started with keeps it outside of the cache.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectUnloadable`] if it takes more than the whole cache.
-    /// - [`ServiceError::Overloaded`] if what would have to make room is in use.
-    /// - [`ServiceError::Cancelled`] if it was stopped.
+    /// [`ServiceError::ObjectUnloadable`] if it takes more than the whole cache, [`ServiceError::Overloaded`] if what would have to make
+    /// room is in use, [`ServiceError::Cancelled`].
     pub(crate) fn derived(
         &self,
         object: &Arc<StoredObject>,
@@ -324,7 +304,9 @@ impl ObjectStore {
         }
         let twin = self.created().derived_of_twin(object);
         let derived = match twin {
-            Some(twin) => object.share(&twin),
+            Some(twin) => object
+                .derived
+                .get_or_build(|| Ok(Arc::new(Derived::clone(&twin))))?,
             None => object.derived_until(stop)?,
         };
         let mut created = self.created();
@@ -375,16 +357,11 @@ impl ObjectStore {
     pub(crate) fn prepared(&self) -> usize {
         let created = self.created();
         let items = created.cache.items.iter();
-        items
-            .filter(|item| matches!(item.product, Product::Derived))
-            .count()
+        let derived = items.filter(|item| matches!(item.product, Product::Derived));
+        derived.count()
     }
 
     /// The place of an object at another size, which the caller fills if it is empty. It counts as that of the object itself.
-    ///
-    /// # Errors
-    /// - [`ServiceError::Invalid`] if both sizes are larger than the whole cache.
-    /// - [`ServiceError::Overloaded`] if what would have to be evicted is in use.
     pub(crate) fn resized(
         &self,
         stored: &Arc<StoredObject>,
@@ -468,9 +445,8 @@ impl ObjectStore {
 }
 
 impl Created {
-    /// Bytes of the cache in use.
     pub(super) fn taken(&self) -> usize {
-        self.bytes + self.cache.bytes
+        self.bytes + self.cache.items.iter().map(|item| item.bytes).sum::<usize>()
     }
 
     fn derived_of_twin(&self, object: &StoredObject) -> Option<Arc<Derived>> {

@@ -18,13 +18,11 @@ use crate::{
 /// Number of evicted ids that are remembered for error messages.
 const REMEMBERED_EVICTIONS: usize = 1024;
 
-/// The created objects.
 #[derive(Debug, Default)]
 pub(super) struct Created {
     pub objects: BTreeMap<String, Entry>,
     /// Ids of objects by the ids of the requests that created them.
     pub requests: HashMap<Uuid, String>,
-    /// What can be made from objects again.
     pub cache: Cache,
     /// Number of objects that are not at rest, and of those about to be added.
     pub loaded: usize,
@@ -38,11 +36,9 @@ pub(super) struct Created {
     /// Number of etags that it made.
     etags: u64,
     pub watchers: Vec<Weak<Watcher>>,
-    /// The objects that are being loaded.
     pub loads: Vec<Load>,
 }
 
-/// A created object.
 #[derive(Debug)]
 pub(super) struct Entry {
     pub state: Listed,
@@ -55,7 +51,6 @@ pub(super) struct Entry {
 }
 
 impl Created {
-    /// None yet; the server starts now.
     pub(super) fn new(now: SystemTime) -> Self {
         Self {
             started: now.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos(),
@@ -71,15 +66,13 @@ impl Created {
 
     pub(super) fn entry(&mut self, id: &str) -> Result<&mut Entry, ServiceError> {
         let evicted = &self.evicted;
-        self.objects
-            .get_mut(id)
-            .ok_or_else(|| ServiceError::ObjectNotFound {
-                name: name_of(id),
-                evicted: evicted.iter().any(|evicted| evicted == id),
-            })
+        let not_found = || ServiceError::ObjectNotFound {
+            name: name_of(id),
+            evicted: evicted.iter().any(|evicted| evicted == id),
+        };
+        self.objects.get_mut(id).ok_or_else(not_found)
     }
 
-    /// The time of a use.
     pub(super) fn tick(&mut self) -> u64 {
         self.uses += 1;
         self.uses
@@ -113,7 +106,6 @@ impl Created {
         Ok(entry)
     }
 
-    /// Adds an object that was not there.
     pub(super) fn add(&mut self, entry: Entry) {
         let id = entry.state.id().to_owned();
         self.count(&entry.state);

@@ -37,9 +37,6 @@ pub(super) struct Load {
 
 impl ObjectStore {
     /// Reads the records of all saved objects, which are then at rest. Gives their number.
-    ///
-    /// # Errors
-    /// They cannot be read.
     pub(crate) async fn read_saved(&self) -> Result<usize, StoreError> {
         let Some(saved) = &self.saved else {
             return Ok(0);
@@ -47,12 +44,11 @@ impl ObjectStore {
         let found = saved.read_all().await?;
         *self.changing() = found.mesh_uses;
         let mut created = self.created();
-        let damaged = found.damaged.into_iter().map(|id| (id, None));
-        let read = found.objects.into_iter().map(|(id, saved)| (id, Some(saved)));
-        for (id, saved) in read.chain(damaged) {
+        for (id, saved) in found.objects {
             if self.pinned.contains_key(&id) {
+                let object = name_of(&id);
                 tracing::warn!(
-                    object = name_of(&id),
+                    object,
                     "a saved object is hidden by one of the same name that the server started with"
                 );
             } else {
@@ -63,9 +59,6 @@ impl ObjectStore {
     }
 
     /// The object with this id, loaded or at rest. If its record was damaged, it is read again: it may have been put back.
-    ///
-    /// # Errors
-    /// Those of [`Self::get`], and [`ServiceError::StoreFailed`].
     pub(crate) async fn found(self: &Arc<Self>, id: &str) -> Result<Listed, ServiceError> {
         let got = self.get(id);
         let (Err(ServiceError::ObjectDamaged { .. }), Some(saved)) = (&got, &self.saved) else {
@@ -94,11 +87,6 @@ impl ObjectStore {
         .await
     }
 
-    /// What its client gives an object at rest.
-    ///
-    /// # Errors
-    /// [`ServiceError::ObjectDamaged`], [`ServiceError::StoreFailed`], and [`ServiceError::ObjectNotFound`] if it was deleted
-    /// meanwhile.
     pub(crate) async fn saved_given(self: &Arc<Self>, id: &str) -> Result<v1::GraspObject, ServiceError> {
         Ok(self.whole_record(id).await?.given())
     }
@@ -107,7 +95,6 @@ impl ObjectStore {
         self.saved.as_ref().ok_or(ServiceError::StoreFailed)
     }
 
-    /// The record of an object.
     async fn whole_record(self: &Arc<Self>, id: &str) -> Result<SavedObject, ServiceError> {
         let saved = self.saved_objects()?;
         loop {
@@ -121,9 +108,6 @@ impl ObjectStore {
 
     /// Finds out why something of an object could not be read when it had this etag: it may have been changed meanwhile, in which case
     /// this returns, or deleted.
-    ///
-    /// # Errors
-    /// [`ServiceError::ObjectNotFound`] if it was deleted, and [`ServiceError::ObjectDamaged`] if it is as it was.
     async fn blame(
         self: &Arc<Self>,
         id: &str,
@@ -157,23 +141,15 @@ impl ObjectStore {
     /// The object with this id, loaded if necessary. It is not evicted while its `object` is held.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectNotFound`].
-    /// - [`ServiceError::ObjectDamaged`], [`ServiceError::ObjectUnloadable`] and [`ServiceError::StoreFailed`] if it
-    ///   cannot be loaded.
-    /// - [`ServiceError::Overloaded`] if the objects that would have to be evicted are in use.
+    /// [`ServiceError::ObjectNotFound`]; [`ServiceError::ObjectDamaged`], [`ServiceError::ObjectUnloadable`] and
+    /// [`ServiceError::StoreFailed`] if it cannot be loaded; [`ServiceError::Overloaded`] if what would have to make room is in use.
     pub(crate) async fn loaded(self: &Arc<Self>, id: &str) -> Result<Revision, ServiceError> {
         loop {
-            let state = self.get(id)?;
-            let resting = match state.body {
-                Body::Loaded(object) => {
-                    return Ok(Revision {
-                        object,
-                        record: state.record,
-                    });
-                }
-                Body::AtRest(resting) => resting,
+            let loaded = match self.get(id)?.loaded() {
+                Ok(loaded) => Some(loaded),
+                Err(resting) => self.load(resting).await?,
             };
-            if let Some(revision) = self.load(resting).await? {
+            if let Some(revision) = loaded {
                 return Ok(revision);
             }
         }
@@ -183,10 +159,8 @@ impl ObjectStore {
     fn load(self: &Arc<Self>, resting: Arc<v1::GraspObject>) -> Shared<BoxFuture<'static, Outcome>> {
         let mut created = self.created();
         created.loads.retain(|load| load.loading.upgrade().is_some());
-        let same = created
-            .loads
-            .iter()
-            .find(|load| Arc::ptr_eq(&load.resting, &resting));
+        let mut loads = created.loads.iter();
+        let same = loads.find(|load| Arc::ptr_eq(&load.resting, &resting));
         if let Some(loading) = same.and_then(|load| load.loading.upgrade()) {
             return loading;
         }
@@ -210,24 +184,17 @@ impl ObjectStore {
         let state = created.objects.get(id).map(|entry| entry.state.clone());
         let is_same = |state: &Listed| matches!(&state.body, Body::AtRest(now) if Arc::ptr_eq(now, resting));
         // What went wrong with a state that is no more is no error of the present one.
-        let Some(state) = state.filter(is_same) else {
+        let Some(mut state) = state.filter(is_same) else {
             return Ok(None);
         };
-        let revision = Revision {
-            object: Arc::new(object?),
-            record: state.record,
-        };
-        let state = Listed::from(revision.clone());
+        state.body = Body::Loaded(Arc::new(object?));
         let reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
         reserved.release(&mut created);
         created.set_state(id, &state);
-        Ok(Some(revision))
+        Ok(state.loaded().ok())
     }
 
     /// The object as it would be created with a change. `None` if its file is not saved.
-    ///
-    /// # Errors
-    /// [`ServiceError::Invalid`], and those of [`Self::loaded`] but for the first.
     pub(crate) async fn rebuilt(
         self: &Arc<Self>,
         id: &str,
@@ -249,8 +216,8 @@ impl ObjectStore {
             if let Some(object) = self.try_read_and_build(id, change).await? {
                 return Ok(object);
             }
-            self.blame(id, etag, &"its mesh is missing, or its SHA-256 is wrong")
-                .await?;
+            let wrong = "its mesh is missing, or its SHA-256 is wrong";
+            self.blame(id, etag, &wrong).await?;
         }
     }
 
@@ -283,10 +250,8 @@ impl ObjectStore {
         match built.await? {
             // Its request was valid under the limits of its time.
             Err(error @ ServiceError::Invalid(_)) if change.is_none() => {
-                Err(ServiceError::ObjectUnloadable {
-                    name: name_of(id),
-                    reason: error.to_string(),
-                })
+                let (name, reason) = (name_of(id), error.to_string());
+                Err(ServiceError::ObjectUnloadable { name, reason })
             }
             built => built,
         }
@@ -305,16 +270,13 @@ fn resting_entry(id: &str, saved: Option<SavedObject>) -> Entry {
     });
     let request = saved.as_ref().and_then(SavedObject::request_key);
     let mesh = saved.as_ref().map(SavedObject::mesh_hash);
-    let description = saved.map_or_else(
-        || v1::GraspObject {
-            name: name_of(id),
-            warnings: vec![
-                "its record is damaged or missing; put the file back, or delete the object".to_owned(),
-            ],
-            ..Default::default()
-        },
-        SavedObject::description,
-    );
+    let warning = "its record is damaged or missing; put the file back, or delete the object";
+    let damaged = || v1::GraspObject {
+        name: name_of(id),
+        warnings: vec![warning.to_owned()],
+        ..Default::default()
+    };
+    let description = saved.map_or_else(damaged, SavedObject::description);
     Entry {
         state: Listed {
             body: Body::AtRest(Arc::new(description)),

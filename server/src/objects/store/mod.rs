@@ -30,7 +30,7 @@ pub(crate) use self::{
     watching::{Event, Report},
 };
 use super::{
-    Listed, Record, Revision, StoredObject,
+    Body, Listed, Record, StoredObject,
     directory::PinnedObject,
     name_of,
     saved::{MeshHash, MeshUses, SavedObject, SavedObjects, log_damage},
@@ -45,8 +45,6 @@ use crate::{
 /// When to retry if every object in the full cache is in use: searches end within seconds.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
-/// All objects.
-///
 /// If objects are saved, the methods that add, change or delete one wait for the disk or network. They are for threads that
 /// may block, in the context of the async runtime.
 #[derive(Debug)]
@@ -64,7 +62,6 @@ pub(crate) struct ObjectStore {
 /// What comes with a new object.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Origin {
-    /// Labels.
     pub labels: Labels,
     /// What identifies the request, if it may be repeated.
     pub request: Option<RequestKey>,
@@ -72,7 +69,6 @@ pub(crate) struct Origin {
     pub mesh: Bytes,
 }
 
-/// True if a built-in object has this id.
 pub(crate) fn is_built_in(id: &str) -> bool {
     object(id).is_some()
 }
@@ -104,20 +100,15 @@ impl ObjectStore {
         }
     }
 
-    /// The objects that the server started with.
     pub(crate) fn pinned(&self) -> impl Iterator<Item = &Arc<StoredObject>> {
         self.pinned.values().filter_map(Listed::object)
     }
 
-    /// True if an object has this id.
     pub(crate) fn contains(&self, id: &str) -> bool {
         self.pinned.contains_key(id) || self.created().objects.contains_key(id)
     }
 
     /// The object with this id, loaded or at rest.
-    ///
-    /// # Errors
-    /// [`ServiceError::ObjectNotFound`], and [`ServiceError::ObjectDamaged`] if its record could not be read.
     pub(crate) fn get(&self, id: &str) -> Result<Listed, ServiceError> {
         match self.pinned.get(id) {
             Some(state) => Ok(state.clone()),
@@ -166,11 +157,8 @@ impl ObjectStore {
     /// that the other created.
     ///
     /// # Errors
-    /// - Those of [`Self::repeated`].
-    /// - [`ServiceError::Invalid`] if it is larger than the whole cache.
-    /// - [`ServiceError::Overloaded`] if the objects that would have to be evicted are in use.
-    /// - [`ServiceError::ObjectsFull`] if as many objects are saved as may be.
-    /// - [`ServiceError::StoreFailed`] if it cannot be saved.
+    /// Those of [`Self::repeated`], [`ServiceError::Invalid`] if it is larger than the whole cache, [`ServiceError::Overloaded`] if
+    /// what would have to make room is in use, [`ServiceError::ObjectsFull`], and [`ServiceError::StoreFailed`].
     pub(crate) fn insert(&self, object: StoredObject, origin: Origin) -> Result<Listed, ServiceError> {
         let mut mesh_uses = self.changing();
         let reserved;
@@ -179,7 +167,11 @@ impl ObjectStore {
             if let Some(state) = self.repeated_in(&created, &object.id, origin.request.as_ref())? {
                 return Ok(state);
             }
-            self.check_count(&created)?;
+            if let Some(&SavedObjects { maximum, .. }) = self.saved.as_ref()
+                && created.objects.len() >= maximum
+            {
+                return Err(ServiceError::ObjectsFull { maximum });
+            }
             let etag = created.next_etag();
             let state = new_state(object, origin.labels, etag, SystemTime::now());
             reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
@@ -199,15 +191,6 @@ impl ObjectStore {
             is_damaged: false,
         });
         Ok(state)
-    }
-
-    fn check_count(&self, created: &Created) -> Result<(), ServiceError> {
-        match &self.saved {
-            Some(SavedObjects { maximum, .. }) if created.objects.len() >= *maximum => {
-                Err(ServiceError::ObjectsFull { maximum: *maximum })
-            }
-            _ => Ok(()),
-        }
     }
 
     /// Saves a new object if objects are saved; gives the hash of its mesh then.
@@ -236,7 +219,6 @@ impl ObjectStore {
         Ok(Some(hash))
     }
 
-    /// The ids of all created objects.
     fn ids(&self) -> Vec<String> {
         self.created().objects.keys().cloned().collect()
     }
@@ -258,10 +240,8 @@ impl ObjectStore {
     /// The object with this id if a client may change it and it has the given etag.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectNotFound`].
-    /// - [`ServiceError::ObjectReadOnly`] if the server started with it.
-    /// - [`ServiceError::ObjectChanged`] if the etag is another one.
-    /// - [`ServiceError::ObjectDamaged`] if its record could not be read.
+    /// [`ServiceError::ObjectNotFound`], [`ServiceError::ObjectReadOnly`] if the server started with it,
+    /// [`ServiceError::ObjectChanged`] if the etag is another one, [`ServiceError::ObjectDamaged`].
     pub(crate) fn changeable(&self, id: &str, etag: Option<&str>) -> Result<Listed, ServiceError> {
         self.check_changeable(id)?;
         let mut created = self.created();
@@ -273,10 +253,7 @@ impl ObjectStore {
     /// room if necessary.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectNotFound`] if it was deleted or evicted meanwhile.
-    /// - [`ServiceError::ObjectChanged`] if it was changed meanwhile.
-    /// - [`ServiceError::ObjectDamaged`] if what was saved of it is damaged.
-    /// - The errors of [`Self::insert`] about room and saving.
+    /// Those of [`Self::changeable`] if it was deleted, evicted or changed meanwhile, and those of [`Self::insert`] about room and saving.
     pub(crate) fn replace(
         &self,
         base: &Listed,
@@ -315,7 +292,6 @@ impl ObjectStore {
         Ok(after)
     }
 
-    /// Saves a change if objects are saved.
     fn save_change(
         &self,
         id: &str,
@@ -331,16 +307,13 @@ impl ObjectStore {
         })?;
         let mut object = before.clone();
         object.set(changed, record);
-        wait_for(saved.write(&object)).inspect_err(|_| {
+        let written = wait_for(saved.write(&object)).map_err(ServiceError::from);
+        written.inspect_err(|_| {
             // A write that failed late may have changed the record. If this fails too, the log says so.
-            let _ = wait_for(saved.write(&before));
+            let _ = wait_for(saved.write(&before)).map_err(ServiceError::from);
         })
     }
 
-    /// Deletes an object.
-    ///
-    /// # Errors
-    /// Those of [`Self::changeable`], and [`ServiceError::StoreFailed`] if what was saved cannot be deleted.
     pub(crate) fn remove(&self, id: &str, etag: Option<&str>) -> Result<(), ServiceError> {
         self.check_changeable(id)?;
         let mut mesh_uses = self.changing();
@@ -348,7 +321,7 @@ impl ObjectStore {
         if let Some(saved) = &self.saved {
             let mut others = self.ids();
             others.retain(|other| other != id);
-            wait_for(saved.delete_record(id, others))?;
+            wait_for(saved.records.delete(id, others))?;
             if let Some(hash) = mesh {
                 self.forget_mesh(&mut mesh_uses, &hash);
             }
@@ -376,8 +349,7 @@ impl ObjectStore {
             listed.truncate(query.size);
         }
         listed.sort_unstable_by(|(a, _), (b, _)| query.order.compare(a, b));
-        let page = listed.into_iter().map(|(_, state)| state.clone());
-        (page.collect(), more)
+        (listed.into_iter().map(|(_, state)| state.clone()).collect(), more)
     }
 
     fn check_changeable(&self, id: &str) -> Result<(), ServiceError> {
@@ -399,30 +371,23 @@ impl ObjectStore {
     }
 }
 
-/// The first state of an object.
 fn new_state(object: StoredObject, labels: Labels, etag: String, now: SystemTime) -> Listed {
-    Listed::from(Revision {
-        object: Arc::new(object),
+    Listed {
+        body: Body::Loaded(Arc::new(object)),
         record: Arc::new(Record {
             labels,
             etag,
             created: now,
             updated: now,
         }),
-    })
+    }
 }
 
 /// A state with another record, and another object if there is one.
 fn with(state: &Listed, object: Option<&Arc<StoredObject>>, record: &Arc<Record>) -> Listed {
-    let record = Arc::clone(record);
-    match object.or(state.object()) {
-        Some(object) => Listed::from(Revision {
-            object: Arc::clone(object),
-            record,
-        }),
-        None => Listed {
-            body: state.body.clone(),
-            record,
-        },
+    let body = object.map(|object| Body::Loaded(Arc::clone(object)));
+    Listed {
+        body: body.unwrap_or_else(|| state.body.clone()),
+        record: Arc::clone(record),
     }
 }

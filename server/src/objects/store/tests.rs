@@ -9,7 +9,6 @@ use super::{
     *,
 };
 use crate::{
-    error::Limit,
     objects::{Derived, derived::ObjectSize, tests::tetrahedron},
     validate::{RequestedSize, page_query},
 };
@@ -34,29 +33,6 @@ fn all_ids(store: &ObjectStore) -> Vec<String> {
     page.iter().map(|state| state.id().to_owned()).collect()
 }
 
-fn labels(value: u8) -> Labels {
-    [("value".to_owned(), value.to_string())].into()
-}
-
-fn request_key(id: u128, content: u8) -> RequestKey {
-    RequestKey {
-        id: Uuid::from_u128(id),
-        content: [content; 32],
-    }
-}
-
-/// An object of the objects directory.
-fn stay() -> PinnedObject {
-    PinnedObject {
-        object: tetrahedron("stay", 1.0, &[]),
-        labels: labels(0),
-    }
-}
-
-fn same_object(a: &Listed, b: &Listed) -> bool {
-    Arc::ptr_eq(a.object().unwrap(), b.object().unwrap())
-}
-
 fn insert(store: &ObjectStore, id: &str) -> Result<(), ServiceError> {
     store
         .insert(tetrahedron(id, 1.0, &[]), Origin::default())
@@ -71,20 +47,11 @@ fn evicts_least_recently_used_by_count_and_by_bytes() {
         store.get("a").unwrap();
         insert(&store, "c").unwrap();
         assert!(store.contains("a") && store.contains("c"));
-        assert_eq!(
-            store.get("b").unwrap_err(),
-            ServiceError::ObjectNotFound {
-                name: "objects/b".into(),
-                evicted: true
-            }
-        );
-        assert_eq!(
-            store.get("z").unwrap_err(),
-            ServiceError::ObjectNotFound {
-                name: "objects/z".into(),
-                evicted: false
-            }
-        );
+        for (id, evicted) in [("b", true), ("z", false)] {
+            let name = name_of(id);
+            let expected = ServiceError::ObjectNotFound { name, evicted };
+            assert_eq!(store.get(id).unwrap_err(), expected);
+        }
         // An evicted object can be created again.
         insert(&store, "b").unwrap();
         store.get("b").unwrap();
@@ -96,40 +63,16 @@ fn keeps_objects_in_use() {
     let store = store(2, 100);
     insert(&store, "a").unwrap();
     insert(&store, "b").unwrap();
-    let a = store.get("a").unwrap().loaded().unwrap().object.hold();
-    let b = store.get("b").unwrap().loaded().unwrap().object.hold();
+    let [a, b] = ["a", "b"].map(|id| store.get(id).unwrap().object().unwrap().hold());
     // Listing an object does not use it.
     let looked_at = store.page(&list(10, ""));
-    assert!(matches!(
-        insert(&store, "c"),
-        Err(ServiceError::Overloaded {
-            limit: Limit::ObjectCache,
-            ..
-        })
-    ));
+    let full = insert(&store, "c").unwrap_err();
+    assert!(matches!(full, ServiceError::Overloaded { .. }), "{full}");
     drop(b);
     insert(&store, "c").unwrap();
     drop(looked_at);
     assert!(store.contains("a") && !store.contains("b"));
     drop(a);
-}
-
-#[test]
-fn directory_objects_stay_and_do_not_count() {
-    let limits = StoreLimits {
-        objects: 1,
-        bytes: tetrahedron("any", 1.0, &[]).bytes(),
-    };
-    let store = ObjectStore::new(limits, vec![stay()], None);
-    for id in ["a", "b"] {
-        insert(&store, id).unwrap();
-    }
-    assert!(store.contains("stay") && store.contains("b") && !store.contains("a"));
-    assert!(matches!(
-        insert(&store, "stay"),
-        Err(ServiceError::ObjectExists { .. })
-    ));
-    assert_eq!(all_ids(&store), ["b", "remote", "scalpel", "scissors", "stay"]);
 }
 
 #[test]
@@ -167,34 +110,32 @@ fn pages_list_every_object_once_in_any_order() {
 #[test]
 fn a_repeated_request_finds_its_object() {
     let store = store(2, 10);
-    let create = |id: &str, request| {
+    let create = |id: &str, request: u128, content: u8| {
         let origin = Origin {
-            labels: labels(1),
-            request: Some(request),
-            mesh: Bytes::new(),
+            request: Some(RequestKey {
+                id: Uuid::from_u128(request),
+                content: [content; 32],
+            }),
+            ..Origin::default()
         };
         store.insert(tetrahedron(id, 1.0, &[]), origin)
     };
-    let first = create("a", request_key(1, 1)).unwrap();
-    let again = create("a", request_key(1, 1)).unwrap();
-    assert!(same_object(&first, &again) && first.record == again.record);
-    for (id, content) in [("a", 2), ("b", 2)] {
-        assert!(matches!(
-            create(id, request_key(1, content)),
-            Err(ServiceError::RequestIdReused { .. })
-        ));
+    let first = create("a", 1, 1).unwrap();
+    let again = create("a", 1, 1).unwrap();
+    assert!(Arc::ptr_eq(&first.record, &again.record));
+    for id in ["a", "b"] {
+        let reused = create(id, 1, 2).unwrap_err();
+        assert!(matches!(reused, ServiceError::RequestIdReused { .. }), "{reused}");
     }
-    assert!(matches!(
-        create("a", request_key(2, 1)),
-        Err(ServiceError::ObjectExists { .. })
-    ));
+    let exists = create("a", 2, 1).unwrap_err();
+    assert!(matches!(exists, ServiceError::ObjectExists { .. }), "{exists}");
     // Forgotten with the object, whether that is deleted or evicted.
     store.remove("a", None).unwrap();
-    create("a", request_key(1, 3)).unwrap();
+    create("a", 1, 3).unwrap();
     for id in ["b", "c"] {
         insert(&store, id).unwrap();
     }
-    create("d", request_key(1, 4)).unwrap();
+    create("d", 1, 4).unwrap();
     assert_eq!(store.created().requests.len(), 1);
 }
 
@@ -208,15 +149,8 @@ fn a_larger_state_evicts_others_but_not_its_own_object() {
         warnings: vec!["long".repeat(5)],
         ..tetrahedron("a", 1.0, &[])
     };
-    store.replace(&base, labels(1), Some(larger)).unwrap();
-    assert!(store.contains("a") && !store.contains("b"));
-    let sum: usize = store
-        .created()
-        .objects
-        .values()
-        .map(|entry| entry.state.bytes())
-        .sum();
-    assert_eq!(store.created().bytes, sum);
+    store.replace(&base, Labels::new(), Some(larger)).unwrap();
+    assert!(store.contains("a") && !store.contains("b") && store.counts_rightly());
 }
 
 impl ObjectStore {
@@ -224,12 +158,8 @@ impl ObjectStore {
     pub(crate) fn counts_rightly(&self) -> bool {
         let created = self.created();
         let states = created.objects.values().map(|entry| &entry.state);
-        let (bytes, loaded) = states.fold((0, 0), |(bytes, loaded), state| {
-            (
-                bytes + state.bytes(),
-                loaded + usize::from(state.object().is_some()),
-            )
-        });
+        let bytes: usize = states.clone().map(Listed::bytes).sum();
+        let loaded = states.filter(|state| state.object().is_some()).count();
         (created.bytes, created.loaded) == (bytes, loaded)
     }
 
@@ -300,7 +230,7 @@ fn what_is_derived_is_built_once_and_counts_until_it_is_dropped() {
 }
 
 #[test]
-fn what_was_asked_for_least_recently_is_dropped_before_any_object() {
+fn what_was_used_least_recently_is_dropped_before_any_object() {
     let any = Arc::new(tetrahedron("any", 0.02, &[]));
     let bytes = derive(&store_of(1 << 30), &any, Need::Call).bytes();
     let store = store_of(5 * bytes / 2);
@@ -320,7 +250,7 @@ fn what_was_asked_for_least_recently_is_dropped_before_any_object() {
 }
 
 #[test]
-fn only_the_newest_are_kept_that_nobody_asked_for() {
+fn only_the_newest_are_kept_that_nobody_requested() {
     let store = store_of(1 << 30);
     let numbers = 0..KEPT_AHEAD as u16 + 3;
     let objects: Vec<_> = numbers.map(|number| insert_numbered(&store, number)).collect();
@@ -402,10 +332,10 @@ fn sizes_in_use_stay_and_are_bounded_by_bytes_and_number() {
 #[test]
 fn an_object_that_fills_the_cache_has_one_size() {
     let small = store_of(1 << 4);
-    let object = tetrahedron("a", 1.0, &[]);
-    assert!(matches!(small.check_size(&object), Err(ServiceError::Invalid(_))));
-    let refused = small.insert(object, Origin::default());
-    assert!(matches!(refused, Err(ServiceError::Invalid(_))), "{refused:?}");
+    let refused = small.check_size(&tetrahedron("a", 1.0, &[])).unwrap_err();
+    assert!(matches!(refused, ServiceError::Invalid(_)), "{refused}");
+    let refused = insert(&small, "a").unwrap_err();
+    assert!(matches!(refused, ServiceError::Invalid(_)), "{refused}");
 
     let store = roomy(1);
     let a = inserted(&store, tetrahedron("a", 1.0, &[]));

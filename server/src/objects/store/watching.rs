@@ -48,9 +48,7 @@ pub(crate) enum Event {
 pub(crate) enum Report {
     /// All objects that were present have been reported.
     PresentEnd,
-    /// What happened to an object.
     Object {
-        /// Its id.
         id: String,
         /// What happened, at least one event.
         events: BTreeSet<Event>,
@@ -59,12 +57,12 @@ pub(crate) enum Report {
     },
 }
 
-/// One watcher.
 #[derive(Debug)]
 pub(crate) struct Watcher {
     filter: ObjectFilter,
     state: Mutex<State>,
-    news: Notify,
+    /// Notified when there may be something to report.
+    pub news: Notify,
 }
 
 #[derive(Debug, Default)]
@@ -88,11 +86,6 @@ impl Watcher {
             }),
             news: Notify::new(),
         }
-    }
-
-    /// Waits until there may be something to tell.
-    pub(crate) async fn news(&self) {
-        self.news.notified().await;
     }
 
     /// Records an event of an object whose labels were `before` and are `after`. `None` if it was or is not there.
@@ -152,12 +145,10 @@ fn combine(events: &mut BTreeSet<Event>, event: Event) {
     if matches!(event, Event::Deleted | Event::Evicted) {
         // What was not reported need not be, unless another object had the name before.
         let is_new = events.contains(&Event::Created);
-        let before = events
-            .iter()
-            .copied()
-            .find(|e| matches!(e, Event::Deleted | Event::Evicted));
-        events.clear();
-        events.extend(if is_new { before } else { Some(event) });
+        events.retain(|before| is_new && matches!(before, Event::Deleted | Event::Evicted));
+        if !is_new {
+            events.insert(event);
+        }
     } else {
         events.insert(event);
     }
@@ -165,9 +156,6 @@ fn combine(events: &mut BTreeSet<Event>, event: Event) {
 
 impl ObjectStore {
     /// A watcher of what happens from now on.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if there are `most` already.
     pub(crate) fn watch(&self, query: WatchQuery, most: usize) -> Result<Arc<Watcher>, ServiceError> {
         let mut created = self.created();
         created.watchers.retain(|watcher| watcher.strong_count() > 0);
@@ -184,9 +172,6 @@ impl ObjectStore {
     }
 
     /// What is reported to the watcher next. `None` if there is nothing yet.
-    ///
-    /// # Errors
-    /// [`ServiceError::WatcherTooSlow`].
     pub(crate) fn next_report(&self, watcher: &Watcher) -> Result<Option<Report>, ServiceError> {
         let created = self.created();
         let mut unreported = watcher.state();
@@ -196,14 +181,11 @@ impl ObjectStore {
         if let Some(last) = &unreported.present {
             let next = self.next_present(&created, &watcher.filter, last);
             unreported.present = next.map(|state| state.id().to_owned());
-            return Ok(Some(match next {
-                None => Report::PresentEnd,
-                Some(state) => Report::Object {
-                    id: state.id().to_owned(),
-                    events: [Event::Present].into(),
-                    state: Some(state.clone()),
-                },
-            }));
+            return Ok(Some(next.map_or(Report::PresentEnd, |state| Report::Object {
+                id: state.id().to_owned(),
+                events: [Event::Present].into(),
+                state: Some(state.clone()),
+            })));
         }
         Ok(unreported.take().map(|(id, events)| Report::Object {
             state: self.state_in(&created, &id).cloned(),

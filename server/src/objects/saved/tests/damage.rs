@@ -7,23 +7,26 @@ fn damaged(id: &str) -> ServiceError {
     ServiceError::ObjectDamaged { name: name_of(id) }
 }
 
+/// Puts these bytes in place of a file, or nothing.
+fn spoil(path: &std::path::Path, wrong: Option<&[u8]>) {
+    match wrong {
+        Some(bytes) => fs::write(path, bytes).unwrap(),
+        None => fs::remove_file(path).unwrap(),
+    }
+}
+
 #[test]
-fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
-    let runtime = runtime();
-    let _context = runtime.enter();
+fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back_or_deleted() {
     let folder = Folder::new();
-    let before = create(&folder.objects(10, 10), "a", 1).unwrap();
-    create(&folder.objects(10, 10), "b", 2).unwrap();
-    let path = folder.0.join(OBJECTS).join("a");
+    let before = create(&folder.objects(), "a", 1).unwrap();
+    create(&folder.objects(), "b", 2).unwrap();
+    let path = folder.record("a");
     let whole = fs::read(&path).unwrap();
     let mut changed = whole.clone();
     changed[40] ^= 1;
     for wrong in [Some(&changed[..]), Some(&whole[..50]), Some(&[]), None] {
-        match wrong {
-            Some(bytes) => fs::write(&path, bytes).unwrap(),
-            None => fs::remove_file(&path).unwrap(),
-        }
-        let objects = folder.objects(10, 10);
+        spoil(&path, wrong);
+        let objects = folder.objects();
         assert_eq!(objects.get("a").map(|_| ()), Err(damaged("a")));
         assert_eq!(wait_for(objects.found("a")).map(|_| ()), Err(damaged("a")));
         assert_eq!(objects.changeable("a", None).map(|_| ()), Err(damaged("a")));
@@ -38,35 +41,19 @@ fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back()
         assert_eq!(found.to_wire(), before.to_wire());
         wait_for(objects.loaded("a")).unwrap();
     }
-}
-
-#[test]
-fn an_object_whose_record_is_damaged_can_be_deleted_and_created_again() {
-    let runtime = runtime();
-    let _context = runtime.enter();
-    let folder = Folder::new();
-    create(&folder.objects(10, 10), "a", 1).unwrap();
-    fs::write(folder.0.join(OBJECTS).join("a"), "not a record").unwrap();
-    let objects = folder.objects(10, 10);
-    objects.remove("a", None).unwrap();
-    drop(objects);
-    let objects = folder.objects(10, 10);
-    assert!(matches!(
-        objects.get("a"),
-        Err(ServiceError::ObjectNotFound { .. })
-    ));
+    fs::write(&path, "not a record").unwrap();
+    folder.objects().remove("a", None).unwrap();
+    let objects = folder.objects();
+    let gone = objects.get("a").unwrap_err();
+    assert!(matches!(gone, ServiceError::ObjectNotFound { .. }), "{gone}");
     create(&objects, "a", 1).unwrap();
-    drop(objects);
-    wait_for(folder.objects(10, 10).loaded("a")).unwrap();
 }
 
 #[test]
 fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
-    let runtime = runtime();
-    let _context = runtime.enter();
     let folder = Folder::new();
-    create(&folder.objects(10, 10), "a", 1).unwrap();
-    let path = folder.0.join(MESHES).join(&folder.names(MESHES)[0]);
+    create(&folder.objects(), "a", 1).unwrap();
+    let path = folder.path.join(MESHES).join(&folder.names(MESHES)[0]);
     let whole = fs::read(&path).unwrap();
     let changed = (0..whole.len()).map(|place| {
         let mut bytes = whole.clone();
@@ -77,11 +64,8 @@ fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
         .step_by(7)
         .map(|length| Some(whole[..length].to_vec()));
     for wrong in changed.chain(cut).chain([None]) {
-        match &wrong {
-            Some(bytes) => fs::write(&path, bytes).unwrap(),
-            None => fs::remove_file(&path).unwrap(),
-        }
-        let objects = folder.objects(10, 10);
+        spoil(&path, wrong.as_deref());
+        let objects = folder.objects();
         for _ in 0..2 {
             let loaded = wait_for(objects.loaded("a")).map(|_| ());
             assert_eq!(loaded, Err(damaged("a")), "{wrong:?}");
@@ -91,47 +75,37 @@ fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
     }
     // Created again, it is whole.
     fs::remove_file(&path).unwrap();
-    let objects = folder.objects(10, 10);
+    let objects = folder.objects();
     objects.remove("a", None).unwrap();
     create(&objects, "a", 1).unwrap();
     drop(objects);
-    wait_for(folder.objects(10, 10).loaded("a")).unwrap();
-}
-
-/// Why a server does not start with this folder.
-fn refusal(folder: &Folder) -> String {
-    let place = StorePlace::Folder(folder.0.clone());
-    let found = SavedFiles::open(&place).and_then(|files| {
-        let saved = SavedObjects::new(Arc::new(files.unwrap()), 10.try_into().unwrap(), LIMITS, 2);
-        wait_for(saved.read_all())
-    });
-    found.map(|_| ()).expect_err("it must not start").to_string()
+    wait_for(folder.objects().loaded("a")).unwrap();
 }
 
 #[test]
 fn a_store_without_all_of_its_meshes_or_records_is_refused_and_left_as_it_is() {
-    let runtime = runtime();
-    let _context = runtime.enter();
-    for several in [false, true] {
-        for lost in [MESHES, OBJECTS] {
-            let folder = Folder::new();
-            let objects = folder.objects(10, 10);
-            create(&objects, "a", 1).unwrap();
-            if several {
-                create(&objects, "b", 2).unwrap();
-            }
-            drop(objects);
-            // Its volume is not mounted: there is no folder, or an empty one.
-            let (of, away) = (folder.0.join(lost), folder.0.join("away"));
-            fs::rename(&of, &away).unwrap();
-            assert!(refusal(&folder).contains(lost), "{}", refusal(&folder));
-            fs::create_dir(&of).unwrap();
-            assert!(refusal(&folder).contains(lost), "{}", refusal(&folder));
-            fs::remove_dir(&of).unwrap();
-            fs::rename(&away, &of).unwrap();
-            let objects = folder.objects(10, 10);
-            wait_for(objects.loaded("a")).unwrap();
+    for (several, lost) in [(false, MESHES), (false, OBJECTS), (true, MESHES), (true, OBJECTS)] {
+        let folder = Folder::new();
+        let objects = folder.objects();
+        create(&objects, "a", 1).unwrap();
+        if several {
+            create(&objects, "b", 2).unwrap();
         }
+        drop(objects);
+        let check_refused = || {
+            let found = folder.open(10).and_then(|saved| wait_for(saved.read_all()));
+            let error = found.map(|_| ()).expect_err("it must not start").to_string();
+            assert!(error.contains(lost), "{error}");
+        };
+        // Its volume is not mounted: there is no folder, or an empty one.
+        let (of, away) = (folder.path.join(lost), folder.path.join("away"));
+        fs::rename(&of, &away).unwrap();
+        check_refused();
+        fs::create_dir(&of).unwrap();
+        check_refused();
+        fs::remove_dir(&of).unwrap();
+        fs::rename(&away, &of).unwrap();
+        wait_for(folder.objects().loaded("a")).unwrap();
     }
 }
 
@@ -140,15 +114,13 @@ fn a_store_without_all_of_its_meshes_or_records_is_refused_and_left_as_it_is() {
 fn folders_and_files_are_private_to_their_user() {
     use std::os::unix::fs::PermissionsExt as _;
 
-    let runtime = runtime();
-    let _context = runtime.enter();
     let folder = Folder::new();
-    let objects = folder.objects(10, 10);
+    let objects = folder.objects();
     let base = create(&objects, "a", 1).unwrap();
     objects.replace(&base, labels(9), None).unwrap();
     let check = || {
         let mut checked = 0;
-        let mut folders = vec![folder.0.clone()];
+        let mut folders = vec![folder.path.clone()];
         while let Some(path) = folders.pop() {
             let about = fs::metadata(&path).unwrap();
             let expected = if about.is_dir() { 0o700 } else { 0o600 };
@@ -164,42 +136,38 @@ fn folders_and_files_are_private_to_their_user() {
     drop(objects);
     // So is what an earlier version wrote.
     for open in ["", OBJECTS, "objects/a"] {
-        let path = folder.0.join(open);
+        let path = folder.path.join(open);
         let mode = if path.is_dir() { 0o755 } else { 0o644 };
         fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
     }
-    drop(folder.objects(10, 10));
+    drop(folder.objects());
     check();
 }
 
 #[test]
 fn changing_an_object_that_is_being_deleted_is_no_damage() {
-    let runtime = runtime();
-    let _context = runtime.enter();
     let folder = Folder::new();
-    let objects = folder.objects(10, 1000);
+    let objects = folder.objects_of(10, 1000);
+    let change = ObjectChange {
+        unit_metres: Some(0.02),
+        ..ObjectChange::default()
+    };
     for round in 0..60 {
         create(&objects, "a", 1 + round % 3).unwrap();
-        let deleting = {
-            let (objects, handle) = (Arc::clone(&objects), runtime.handle().clone());
-            std::thread::spawn(move || {
-                let _context = handle.enter();
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let _context = RUNTIME.enter();
                 objects.remove("a", None).unwrap();
-            })
-        };
-        for _ in 0..3 {
-            let change = ObjectChange {
-                unit_metres: Some(0.02),
-                ..ObjectChange::default()
-            };
-            for result in [
-                wait_for(objects.rebuilt("a", &change)).map(|_| ()),
-                wait_for(objects.saved_given("a")).map(|_| ()),
-            ] {
-                let is_right = matches!(result, Ok(()) | Err(ServiceError::ObjectNotFound { .. }));
-                assert!(is_right, "{result:?}");
+            });
+            for _ in 0..3 {
+                for result in [
+                    wait_for(objects.rebuilt("a", &change)).map(|_| ()),
+                    wait_for(objects.saved_given("a")).map(|_| ()),
+                ] {
+                    let is_right = matches!(result, Ok(()) | Err(ServiceError::ObjectNotFound { .. }));
+                    assert!(is_right, "{result:?}");
+                }
             }
-        }
-        deleting.join().unwrap();
+        });
     }
 }
