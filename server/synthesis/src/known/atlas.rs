@@ -193,8 +193,7 @@ pub(super) fn stamp(entries: &[Entry]) -> u64 {
         .fold(0, |stamp, &byte| stamp << 8 | u64::from(byte))
 }
 
-/// Largest number of moved grips selected for a holdout, the ones farthest from its barriers by inner spheres. Fewer answer fewer
-/// givers, more delay answers.
+/// Largest number of moved grips selected for a holdout, the ones farthest from its barriers by inner spheres.
 const MAX_SELECTED: usize = 96;
 
 /// Grips compared with one giver by inner spheres between two checks of the stop.
@@ -224,11 +223,8 @@ impl Grips {
         }
     }
 
-    /// The grips that meet the requirements and are farthest from the barriers, moved to the object by `entry`; the first ones win
-    /// ties. `clearance` bounds the distance from the barriers from above, in metres.
-    ///
-    /// # Errors
-    /// [`Stopped`].
+    /// The grips that meet the requirements and are farthest from the barriers, moved to the object by `entry`; the first ones
+    /// win ties.
     pub(super) fn farthest<T: Copy>(
         candidates: impl Iterator<Item = T>,
         clearance: impl Fn(T, Barriers<'_>) -> f32,

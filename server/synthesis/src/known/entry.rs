@@ -264,6 +264,12 @@ pub fn nearest_direction(up: Vec3) -> usize {
     cosines.iter().position(|&cosine| cosine == highest).unwrap_or(0)
 }
 
+/// The axis nearest to a direction: 0 to 5 for x, -x, y, -y, z, -z.
+pub(crate) fn nearest_axis(direction: Vec3) -> u8 {
+    let axis = direction.abs().max_position();
+    2 * axis as u8 + u8::from(direction[axis] < 0.0)
+}
+
 // One bit per direction.
 const _: () = assert!(DIRECTIONS == 64);
 

@@ -25,15 +25,13 @@ use super::{
 };
 use crate::{model::score::Term, physical::receiver::Receiver};
 
-/// Grips on the shortlist of a direction of gravity. Fewer leave more givers without a listed grip; more lower the share of what
-/// ships that nearly all givers leave free.
+/// Grips on the shortlist of a direction of gravity.
 const LIST_LENGTH: usize = 96;
 
 /// Number of sampled givers. With half as many, up to 4 of a hundred holdouts more find no listed grip.
 const SAMPLED_GIVERS: usize = 512;
 
-/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254. More finds a listed grip
-/// for more givers, at lower values.
+/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254.
 const VALUE_MARGIN: u8 = 40;
 
 /// Givers whose gains are added at once: a register of bytes.

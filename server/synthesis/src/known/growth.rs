@@ -56,8 +56,7 @@ pub use self::grown::Grown;
 /// Grips of a complete atlas. More offer more choice, and cost time and about 1.3 kilobytes each.
 pub const ENTRIES: usize = 8192;
 
-/// Grips and proposals after which a growth is [enough](Growth::is_enough): some four seconds of work. Four times as many raise
-/// the scores of the chosen grips by a twentieth, and answer a giver in twenty more of very thin objects.
+/// Grips and proposals after which a growth is [enough](Growth::is_enough): some four seconds of work.
 const ENOUGH_GRIPS: usize = 1536;
 const ENOUGH_PROPOSALS: u64 = 24_576;
 
@@ -84,8 +83,7 @@ const PERTURBED_SHARE: f32 = 0.5;
 /// Share of fresh proposals that wrap a handle, if the object has one: people hold it there.
 const HANDLE_SHARE: f32 = 0.5;
 
-/// Share of fresh proposals that hold an object where its owner wants hands, and of the kept grips that do. Chance finds few on
-/// what is small, and a giver leaves none of them.
+/// Share of fresh proposals that hold an object where its owner wants hands, and of the kept grips that do.
 const WANTED_SHARE: f32 = 0.5;
 
 /// Seed of the givers.
@@ -94,8 +92,7 @@ const GIVERS_SEED: u64 = 0x4749_5645;
 /// Number of grips from which on rounds have givers.
 const MIN_GRIPS_FOR_GIVERS: usize = 256;
 
-/// A giver that leaves this many grips clear needs no more, whatever the gravity. For one that leaves fewer, grips are admitted
-/// even to full cells.
+/// A giver that leaves this many grips clear needs no more, whatever the gravity.
 const ENOUGH_CLEAR_GRIPS: usize = 60;
 
 /// Largest number of redraws of a grip from a crowded cell.

@@ -107,16 +107,13 @@ pub struct HeldPrimitive {
     pub grips: Grips,
 }
 
-/// Largest number of transferred grips, the best fitting ones. More answer few givers more; each costs fifty nanoseconds per
-/// selection and two microseconds once.
+/// Largest number of transferred grips, the best fitting ones.
 const MAX_GRIPS: usize = 1024;
 
-/// Number of boxes that grips are transferred from, the most similar ones. More cover parts that differ from the whole, such as a
-/// knife's blade; too many add grips that fit but do not hold.
+/// Number of boxes that grips are transferred from, the most similar ones.
 const NEAREST_BOXES: usize = 5;
 
-/// Largest distance of thumb and finger from the surface, in metres. More admits grips that do not hold; less leaves so few that
-/// answers come later.
+/// Largest distance of thumb and finger from the surface, in metres.
 const MAX_CONTACT_OFFSET: f32 = 0.002;
 
 /// Grips transferred to the object between two checks of the stop.
@@ -125,12 +122,10 @@ const MOVES_PER_CHECK: usize = 32;
 /// Smallest size in comparisons, in metres: logarithms need a positive one.
 const MIN_SIZE: f32 = 0.001;
 
-/// Distance within which a contact is projected onto the surface, in metres: closing the digits makes up for it. Less loses grips
-/// that hold; more gains none.
+/// Distance within which a contact is projected onto the surface, in metres: closing the digits makes up for it.
 const SNAP_DISTANCE: f32 = 0.004;
 
-/// Cosine of the largest angle between a contact's normal and the surface's: 45°. Stricter and looser limits both pass worse
-/// seeds for thin objects.
+/// Cosine of the largest angle between a contact's normal and the surface's: 45°.
 const SCREEN_COS: f32 = 0.7;
 
 /// The rotations that map a box onto itself: identity, and half a turn about each axis.

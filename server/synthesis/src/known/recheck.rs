@@ -56,9 +56,6 @@ impl<'a> GripChecker<'a> {
     }
 
     /// The same without the requirements.
-    ///
-    /// # Errors
-    /// The first check that the grip fails.
     pub(crate) fn check_holdout(
         &self,
         entry: &Entry,
@@ -111,9 +108,6 @@ impl<'a> GripChecker<'a> {
     }
 
     /// The receiver's arm, if it must reach the grip.
-    ///
-    /// # Errors
-    /// [`Check::Reach`] if it does not.
     pub(crate) fn arm(&self, entry: &Entry) -> Result<Option<ArmPose>, Check> {
         let arm = self.around.required_arm(entry.grip.pose.frame_from_wrist);
         self.around

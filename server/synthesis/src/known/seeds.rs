@@ -37,8 +37,7 @@ use crate::{
 /// Number of seeds. Fewer answer fewer givers; more include grips that are farther from clear and hold less often.
 const SEEDS: usize = 32;
 
-/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone. More find one more often near grips that
-/// are deep in the giver's hand.
+/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone.
 const MAX_DRAWS: usize = 48;
 
 /// Largest displacement along each axis, in metres. Larger ones lose the contacts.

@@ -5,7 +5,7 @@ use std::{cmp::Reverse, collections::HashMap};
 
 use glam::{IVec3, Vec3};
 
-use super::entry::Entry;
+use super::entry::{Entry, nearest_axis};
 use crate::{
     model::{
         grasp::Contact,
@@ -19,8 +19,7 @@ use crate::{
 /// Edge of the cells that palms are sorted into, in metres.
 const PALM_CELL: f32 = 0.02;
 
-/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from many. Fewer leave
-/// atlases of thin objects unfilled; more leave less choice next to givers.
+/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from many.
 const MAX_PER_CELL: usize = 4;
 
 /// Number of touching fingers from which a hand counts as large: hands with fewer are clear of more givers.
@@ -100,20 +99,13 @@ pub(super) fn base_score(entry: &Entry) -> f32 {
     grip_total(&entry.grip_values)
 }
 
-/// The axis nearest to a direction: 0 to 5 for x, -x, y, -y, z, -z.
-fn nearest_axis(direction: Vec3) -> u8 {
-    let axis = direction.abs().max_position();
-    2 * axis as u8 + u8::from(direction[axis] < 0.0)
-}
-
 /// Edge of a cell in metres. Smaller cells separate hands better; memory grows with the third power.
 const CELL: f32 = 0.0125;
 
 /// Largest number of cells. Larger objects get larger cells, which separate hands less well.
 const MAX_CELLS: f32 = 10_000.0;
 
-/// Largest number of cells kept per 512 grips, those that most hands fill: about 2,600 for 8,192 grips. Fewer tell fewer
-/// collisions.
+/// Largest number of cells kept per 512 grips, those that most hands fill: about 2,600 for 8,192 grips.
 const MAX_LINES: usize = 41_600;
 const LINE: usize = 512;
 

@@ -53,12 +53,10 @@ const SKEW: [f32; 2] = [0.05, 0.75];
 /// Range of the place in the palm at which it meets a handle, in metres from the palm's centre: across, and toward the fingers.
 const PALM_OFFSETS: [[f32; 2]; 2] = [[-0.01, 0.01], [0.012, 0.038]];
 
-/// Yaw of the thumb as a share of its range: of a hand around a wire, more per metre of the handle's radius, and the spread. A
-/// thumb that is lifted further passes thin handles by.
+/// Yaw of the thumb as a share of its range: of a hand around a wire, more per metre of the handle's radius, and the spread.
 const THUMB_YAW: [f32; 3] = [0.1, 20.0, 0.2];
 
-/// Range of how far thumb and fingers are closed before, as shares of their range. A thumb that is less so meets what is next to
-/// the handle.
+/// Range of how far thumb and fingers are closed before, as shares of their range.
 const PRESHAPE: [[f32; 2]; 2] = [[0.15, 0.45], [0.0, 0.3]];
 
 /// Places a hand with a handle across its palm. Returns `None` if there is no handle, or no drawn hand fits.
@@ -179,17 +177,14 @@ const MAX_SAG: f32 = 0.01;
 /// Largest number of hands tried until palm and forearm fit.
 const MAX_HOOKED_HANDS: usize = 12;
 
-/// Ranges of the first and the second joint's flexion before the fingers close, in radians. Knuckles that are straighter leave
-/// the fingertips below the bar.
+/// Ranges of the first and the second joint's flexion before the fingers close, in radians.
 const KNUCKLE_FLEXION: [f32; 2] = [0.35, 1.0];
 const MIDDLE_FLEXION: [f32; 2] = [0.7, 1.25];
 
-/// Largest share, of the way from the second joint to the third, at which a hook lifts. With more, the last link is below what it
-/// should hold back.
+/// Largest share, of the way from the second joint to the third, at which a hook lifts.
 const MAX_SHARE_ALONG: f32 = 0.45;
 
-/// Range of the angle in radians by which the hook turns about the bar, fingertips up. With less, the lip is on the knuckles'
-/// side only.
+/// Range of the angle in radians by which the hook turns about the bar, fingertips up.
 const TILT: [f32; 2] = [0.0, 0.45];
 
 /// Range of the gap in metres between the lifting links and what they lift before they close.

@@ -9,7 +9,7 @@
 //! fingers ([`handles`]). What takes two hands is held on both sides of its centre of mass ([`both_hands`]), mostly by mirror
 //! images of one hand.
 //!
-//! Proposals pass no check here; a hand that nearly passes them is perturbed a few times (`PhysicalAttempt::hold_or_refine`).
+//! Proposals pass no check here; a hand that nearly passes them is perturbed a few times (`hold_or_refine`).
 
 pub mod both_hands;
 pub mod handles;

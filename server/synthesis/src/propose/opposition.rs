@@ -15,8 +15,7 @@ use crate::{
 /// [`PINCH_WIDTH`], 45° above.
 const MIN_FACING_COS: [f32; 2] = [0.6, 0.7];
 
-/// Range of the bend ratios of thumb and fingers: from nearly straight fingers that flex at the knuckles to curled ones. It
-/// includes those of the thesis' Algorithm 4.
+/// Range of the bend ratios of thumb and fingers: from nearly straight fingers that flex at the knuckles to curled ones.
 const BEND_RATIO: [f32; 2] = [0.35, 1.6];
 
 /// Oppositions sampled per rig. More are more varied, but each adds about 150 µs to the first use of a rig.
@@ -25,8 +24,7 @@ const OPPOSITIONS: usize = 1024;
 /// Upper bound on the draws per rig; on a human-like hand, one in five succeeds.
 const MAX_DRAWS: u64 = 16 * OPPOSITIONS as u64;
 
-/// Range of distances between opposed pads, in metres: from a blade to the widest object a hand can grasp. Sampled log-uniformly,
-/// since a millimetre matters among thin objects.
+/// Range of distances between opposed pads, in metres: from a blade to the widest object a hand can grasp.
 const WIDTH_RANGE: [f32; 2] = [0.003, 0.11];
 
 /// Steps of the local search that brings a hand's pads into opposition.
@@ -47,15 +45,13 @@ const PAD_POSITIONS: [f32; 2] = [0.5, 1.0];
 /// Width in metres up to which an object counts as thin, in [`FINGER_SETS`] and [`MIN_FACING_COS`].
 const PINCH_WIDTH: f32 = 0.015;
 
-/// Share of hands for thin objects in which only the index finger opposes the thumb and the others lie next to it. Raising it
-/// speeds up the search for hands of a clear type on thin objects.
+/// Share of hands for thin objects in which only the index finger opposes the thumb and the others lie next to it.
 const INDEX_ALONE_SHARE: f32 = 0.7;
 
 /// Seed of the draws: arbitrary, but fixed so that a rig always has the same oppositions.
 const SEED: u64 = 0x4f50_504f;
 
 /// Share of oppositions between the thumb and the fingers' distal pads; the others use the middle phalanges, deeper in the hand.
-/// Raising it speeds up the search for hands of a clear type.
 const DISTAL_SHARE: f32 = 0.8;
 
 /// Positions of inner spheres along each solid of the palm and of the forearm: those that collide most often come first.
@@ -65,8 +61,7 @@ const INNER_SPHERE_POSITIONS: [[f32; 3]; 2] = [[0.6, 0.95, 0.2], [0.2, 0.6, 1.0]
 const INNER_SPHERE_GROUPS: usize =
     (INNER_SPHERE_POSITIONS[0].len() * (PALM_SOLIDS + FOREARM_SOLIDS)).div_ceil(SPHERES);
 
-/// Inner spheres of a closing digit: the link, and the position along it. First links are left out, as the palm's spheres cover
-/// them.
+/// Inner spheres of a closing digit: the link, and the position along it.
 const LINK_SPHERE_POSITIONS: [(usize, f32); 3] = [(1, 0.5), (2, 0.2), (2, 1.0)];
 
 /// Groups of [`SPHERES`] inner spheres for the links of five digits.
@@ -89,8 +84,7 @@ pub struct Opposition {
     pub links: [Spheres; LINK_SPHERE_GROUPS],
 }
 
-/// Sets of closing digits, with the shares of hands that use them on thin and on thicker objects. A thin object turns between two
-/// digits, so most hands bring all their fingers to one.
+/// Sets of closing digits, with the shares of hands that use them on thin and on thicker objects.
 const FINGER_SETS: [([bool; 5], [f32; 2]); 4] = [
     ([true, true, false, false, false], [0.05, 0.1]),
     ([true, true, true, false, false], [0.1, 0.25]),
@@ -101,8 +95,7 @@ const FINGER_SETS: [([bool; 5], [f32; 2]); 4] = [
 /// Share of hands that tuck their idle fingers into the palm, as people do when pinching; tucked fingers stay clear of the giver.
 const TUCKED_SHARE: f32 = 0.4;
 
-/// How much wider than the opposed pose a hand is preshaped, as a share of the digits' range. More makes the approach collide
-/// more with object and giver, less leaves thicker parts of the object too thick.
+/// How much wider than the opposed pose a hand is preshaped, as a share of the digits' range.
 const PRESHAPE_OPENING: f32 = 0.22;
 
 /// Draws a hand shape of a rig for an object of a width in metres.

@@ -45,8 +45,7 @@ const MAX_DRAWN_ROTATIONS: usize = 48;
 /// Candidates sampled per proposal and ordered by the success prior. With half or twice as many, searches take longer.
 const COMPARED: usize = 64;
 
-/// Exponent of the success prior when ordering candidates. A larger one finds grasps sooner where the prior is right, but less
-/// varied ones.
+/// Exponent of the success prior when ordering candidates.
 const PREFERENCE: f32 = 2.0;
 
 /// Share of proposals drawn without the success prior, so that grasps it misjudges are found too.
@@ -55,8 +54,7 @@ const EVEN_SHARE: f32 = 0.2;
 /// Largest number of pairs or points drawn until one is clear of the barriers.
 const MAX_DRAWS: usize = 64;
 
-/// Largest distance, in metres, by which a hand placed in an obstacle is moved out of it: about a fingertip's thickness. A thin
-/// object on a table offers points too low for the tips, and edges just above. More moves the digits off the object.
+/// Largest distance, in metres, by which a hand placed in an obstacle is moved out of it: about a fingertip's thickness.
 const MAX_WAY_OUT: f32 = 0.015;
 
 /// How deep inner spheres of the digits may be in the object at the opposed pose, in metres, where it is thin (up to [`THIN`])

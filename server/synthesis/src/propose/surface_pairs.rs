@@ -19,8 +19,7 @@ use crate::{
     physical::barriers::Barriers,
 };
 
-/// Points sampled on the surface. More cover small parts of large objects better, but each adds about a microsecond to the
-/// registration of an object.
+/// Points sampled on the surface.
 const SAMPLES: u64 = 2048;
 
 /// Seed of the samples: arbitrary, but fixed so that an object always has the same points.
@@ -44,12 +43,10 @@ const FINGER_CLEARANCE: f32 = 0.006;
 /// Minimum distance in metres between a point touched by the palm and another hand.
 const PALM_CLEARANCE: f32 = 0.012;
 
-/// Minimum distance in metres between either point and an obstacle. Fingers reach closer to a flat one, such as the table under a
-/// pen, than to a hand's bulges: with a finger's distance, thin objects on a table offer no points.
+/// Minimum distance in metres between either point and an obstacle.
 const OBSTACLE_CLEARANCE: f32 = 0.003;
 
 /// Opposed places closer than this, in metres, are within any hand's reach and not compared further: most of an adult's span.
-/// Smaller values take longer to prepare large objects.
 const CLOSE: f32 = 0.12;
 
 /// Opposed places farther apart than this, in metres, are beyond any hand.

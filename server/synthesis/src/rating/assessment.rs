@@ -7,7 +7,8 @@ use super::{
 use crate::{
     base::{
         pose::Pose,
-        rejection::Rejection,
+        rejection::{Failure, Rejection},
+        stop::Stop,
         stopwatch::{Step, Stopwatch},
     },
     model::{
@@ -24,6 +25,7 @@ use crate::{
         grip::{Grip, Gripper, PosedDigits, clear_of_barriers},
         immobility::{Balance, Buffers, balance},
         presented::{ObjectScene, Presented},
+        shape::Proposal,
         solids::{HandSolids, TrackedSolids},
     },
     thesis::algorithm_1::HeldObject,
@@ -50,9 +52,6 @@ pub struct GraspContext<'a> {
 
 impl GraspContext<'_> {
     /// Checks and rates the grip that `gripper` has just closed, whose hand is `solids`.
-    ///
-    /// # Errors
-    /// The first failed check.
     pub(crate) fn assess(
         &self,
         grip: &Grip,
@@ -87,6 +86,33 @@ impl GraspContext<'_> {
             |hang| hang.relative_lip(),
         );
         self.rated(grasp, relative_closure, solids).map(Box::new)
+    }
+
+    /// Closes and checks a proposed hand.
+    ///
+    /// # Errors
+    /// The first check that fails, or the stop signal.
+    pub fn hold(
+        &self,
+        proposal: &Proposal,
+        gripper: &mut Gripper,
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
+        let (grip, solids) = self.close(proposal, gripper, stopwatch, stop)?;
+        Ok(self.assess(&grip, &solids, gripper, stopwatch)?)
+    }
+
+    /// Closes a proposed hand.
+    pub(crate) fn close(
+        &self,
+        proposal: &Proposal,
+        gripper: &mut Gripper,
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<(Grip, HandSolids), Failure> {
+        let presented = Some(self.presented);
+        gripper.grip(&self.object, self.rig, proposal, presented, stopwatch, stop)
     }
 
     /// The grasp of a hand that somebody posed: with digits closed or opened as little as it takes to touch or, if that is not
@@ -253,11 +279,7 @@ pub(crate) fn thesis_grasp(object: &GraspObject, rig: &Rig, held: HeldObject) ->
     }
 }
 
-/// Checks and rates two hands that hold together: each against its own context, closure and balance for both. The grasp
-/// of the second is [`Grasp::other_hand`] of the first.
-///
-/// # Errors
-/// The first failed check.
+/// Checks and rates two hands that hold together: each against its own context, closure and balance for both.
 pub(crate) fn assess_both(
     around: [&GraspContext<'_>; 2],
     halves: [&HalfGrip; 2],

@@ -5,7 +5,10 @@ use glam::Vec3;
 use super::{scene::Task, settings::SearchSettings};
 use crate::{
     base::stop::Stop,
-    known::{entry::Entry, recheck::GripChecker},
+    known::{
+        entry::{Entry, nearest_axis},
+        recheck::GripChecker,
+    },
     model::{
         holdout::{HandShape, Holdout},
         requirements::Check,
@@ -210,6 +213,5 @@ fn place_of(check: Check) -> Option<usize> {
 /// The place in [`SIDES`] of the direction that a hand comes from.
 fn side_of(entry: &Entry) -> usize {
     let from = entry.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
-    let nearest = (0..SIDES.len()).max_by(|&a, &b| SIDES[a].dot(from).total_cmp(&SIDES[b].dot(from)));
-    nearest.unwrap_or_default()
+    usize::from(nearest_axis(from))
 }

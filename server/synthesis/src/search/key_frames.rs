@@ -38,8 +38,7 @@ pub const OPEN_CLEARANCE: f32 = 0.002;
 /// looks more like reaching, and collides with barriers more often.
 pub const APPROACH_DISTANCE: f32 = 0.12;
 
-/// Distances by which fingertips open, in metres, or as far as the joints allow. The first that is free for all digits is taken,
-/// then the smallest that is free for each.
+/// Distances by which fingertips open, in metres, or as far as the joints allow.
 const OPENINGS: [f32; 5] = [0.025, 0.035, 0.05, 0.07, f32::INFINITY];
 
 /// Distances from `PRE_GRASP` to `CLOSE`, in metres: none if the hand can open in place, and some for a palm that rests on the

@@ -256,8 +256,6 @@ fn reach_limit(reach: Reach, region: &OrientedBox, rig: &Rig) -> Option<Limit> {
 }
 
 /// The distance of a box from the vertical line through a point, in metres; 0 if they meet.
-///
-/// Seen along the line, the box is a polygon.
 fn horizontal_distance(region: &OrientedBox, point: Vec3, up: Vec3) -> f32 {
     let OrientedBox {
         object_from_box,

@@ -13,7 +13,7 @@ use super::{
     Replaceable, SearchEnd, SearchOutcome,
     attempt::Attempt,
     current::{is_at_hand, nearness},
-    known_grips::{KnownGrips, TryResult, grasp_value},
+    known_grips::{KnownGrips, grasp_value},
     report::{FoundGrasp, GraspSource, Record, SearchReport, Tally},
     scene::Scene,
     settings::SearchSettings,
@@ -30,8 +30,7 @@ use crate::{
     physical::grip::Gripper,
 };
 
-/// How long known grips are tried before other workers are woken for fresh attempts. Waking them takes about 50 µs, and nine in
-/// ten requests have their answer by then.
+/// How long known grips are tried before other workers are woken for fresh attempts.
 const HEAD_START: Duration = Duration::from_micros(300);
 
 /// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose it.
@@ -200,14 +199,11 @@ impl<'a> Race<'a> {
 
     /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search is reproducible.
     pub(super) fn tries_known_first(&self) -> bool {
-        if self.known.is_none() {
+        if self.known.is_none() || self.settings.query.choice == Choice::BestWithinBudget {
             return false;
         }
-        match (self.settings.query.choice, self.settings.run.reproducible) {
-            (Choice::BestWithinBudget, _) => false,
-            (Choice::FirstValid, true) => self.try_known_until(None),
-            (Choice::FirstValid, false) => self.try_known_until(Some(self.clock.now() + HEAD_START)),
-        }
+        let is_reproducible = self.settings.run.reproducible;
+        self.try_known_until((!is_reproducible).then(|| self.clock.now() + HEAD_START))
     }
 
     /// True if the best known grip is valid, but attempts may replace it.
@@ -235,15 +231,8 @@ impl<'a> Race<'a> {
         gripper: &mut Gripper,
         is_late: impl Fn() -> bool,
     ) -> Option<(GraspSource, Box<Grasp>)> {
-        let known = self.known?;
-        while !self.is_over_for(0) && !is_late() {
-            match known.try_next(gripper) {
-                TryResult::Exhausted => return None,
-                TryResult::Rejected => {}
-                TryResult::Valid(source, grasp) => return Some((source, grasp)),
-            }
-        }
-        None
+        self.known?
+            .next_valid(gripper, || self.is_over_for(0) || is_late())
     }
 
     /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the best grasp is
@@ -268,16 +257,15 @@ impl<'a> Race<'a> {
         let goes_on = self.show(source, &grasp, value);
         let is_reproducible = self.settings.run.reproducible;
         let (refinement, attempts) = self.refinement_of(&grasp);
-        let mut winner = Winner {
+        // A known grip precedes all attempts.
+        let first = self.settings.run.first_attempt;
+        let next = source.attempt().map_or(first, |index| index.saturating_add(1));
+        let winner = Winner {
             source,
             grasp,
             value,
-            last_replacing: 0,
+            last_replacing: next.saturating_add(attempts - 1),
         };
-        // A known grip precedes all attempts.
-        let after = |index: u64| index.saturating_add(1);
-        let next = winner.index().map_or(self.settings.run.first_attempt, after);
-        winner.last_replacing = next.saturating_add(attempts - 1);
         let mut winners = lock(&self.winners);
         let rival = &mut winners.chosen;
         let is_preferred = match (self.settings.query.choice, source) {
@@ -306,7 +294,7 @@ impl<'a> Race<'a> {
                 // A known grip precedes every attempt.
                 rival
                     .as_ref()
-                    .is_none_or(|lowest| lowest.index().is_some_and(|lowest| index < lowest))
+                    .is_none_or(|lowest| lowest.source.attempt().is_some_and(|lowest| index < lowest))
             }
             (Choice::FirstValid, _) => {
                 self.over.store(true, Ordering::Relaxed);
@@ -390,24 +378,21 @@ impl<'a> Race<'a> {
         let is_reproducible = self.settings.run.reproducible;
         let winners = self.winners.into_inner().unwrap_or_else(PoisonError::into_inner);
         let (winner, replaceable_until) = winners.decided(is_reproducible);
-        let replaceable_until = match replaceable_until {
-            Some(last) if is_reproducible => Some(Replaceable::UntilAttempt(last)),
-            Some(_) => Some(Replaceable::UntilTime(Duration::from_nanos(
-                self.settles.into_inner(),
-            ))),
-            None => None,
-        };
+        let settles = Duration::from_nanos(self.settles.into_inner());
+        let replaceable_until = replaceable_until.map(|last| match is_reproducible {
+            true => Replaceable::UntilAttempt(last),
+            false => Replaceable::UntilTime(settles),
+        });
         // Reproducible: an interrupted attempt with a lower index, or one that replaces the winner, might have won.
         let last_deciding = match replaceable_until {
             Some(Replaceable::UntilAttempt(last)) => Some(last),
-            _ => winner.as_ref().and_then(Winner::index),
+            _ => winner.as_ref().and_then(|winner| winner.source.attempt()),
         };
-        let winner =
+        let mut winner =
             winner.filter(|_| !is_reproducible || last_deciding.is_none_or(|index| index < interrupted));
-        let winner = winner.map(|mut winner| {
+        if let Some(winner) = &mut winner {
             self.scene.pose_arm(&mut winner.grasp);
-            winner
-        });
+        }
         let source = winner.as_ref().map(|winner| winner.source);
         let end = if winner.is_some() {
             SearchEnd::Found
@@ -463,13 +448,6 @@ struct Winners {
     others: Vec<Winner>,
 }
 
-impl Winner {
-    /// The index of the attempt that found it; `None` for known grips.
-    fn index(&self) -> Option<u64> {
-        self.source.attempt()
-    }
-}
-
 impl Winners {
     /// The winner and, if a person would not choose it, the last attempt of a reproducible search that may replace it, or any
     /// number.
@@ -477,13 +455,17 @@ impl Winners {
         let Self { chosen, others } = self;
         let last = others.iter().map(|other| other.last_replacing).min();
         // Beyond the last, attempts may have run that need not have.
-        let counts = |winner: &Winner| !is_reproducible || winner.index() <= last;
+        let counts = |winner: &Winner| !is_reproducible || winner.source.attempt() <= last;
         if let Some(chosen) = chosen
             && (last.is_none() || counts(&chosen))
         {
             return (Some(chosen), None);
         }
-        let better = |a: &Winner, b: &Winner| a.value.total_cmp(&b.value).then(b.index().cmp(&a.index()));
+        let better = |a: &Winner, b: &Winner| {
+            a.value
+                .total_cmp(&b.value)
+                .then(b.source.attempt().cmp(&a.source.attempt()))
+        };
         (others.into_iter().filter(counts).max_by(better), last)
     }
 }

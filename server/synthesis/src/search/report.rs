@@ -8,6 +8,7 @@ use super::limits::Limit;
 use crate::{
     base::{rejection::Rejection, stopwatch::StepTimes},
     geometry::boxes::Aabb,
+    known::entry::nearest_axis,
     model::{
         grasp::{Contact, Grasp},
         grasp_type::GraspType,
@@ -267,21 +268,12 @@ pub struct Differences {
 /// What all grasps of a class have in common, as far as it counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Class {
-    /// The side that the hand comes from, and the hand.
-    pub approach: Option<(Side, Handedness)>,
+    /// The side that the palm faces away from most, 0 to 5 for x, -x, y, -y, z, -z, and the hand.
+    pub approach: Option<(u8, Handedness)>,
     /// The type; the inner none for a grasp without a type.
     pub grasp_type: Option<Option<GraspType>>,
     /// The part that is held.
     pub region: Option<Part>,
-}
-
-/// A direction of the object's axes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Side {
-    /// Which axis: 0 to 2.
-    pub axis: u8,
-    /// True for the direction against it.
-    pub is_negative: bool,
 }
 
 /// A part of an object.
@@ -297,20 +289,13 @@ impl Class {
     /// The class of a grasp on an object.
     pub fn of(grasp: &Grasp, handedness: Handedness, object: &GraspObject, by: Differences) -> Self {
         Self {
-            approach: by.approach.then(|| (side_of(grasp), handedness)),
+            approach: by.approach.then(|| {
+                let away = grasp.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
+                (nearest_axis(away), handedness)
+            }),
             grasp_type: by.grasp_type.then_some(grasp.classification.grasp_type),
             region: by.region.then(|| part_of(&grasp.contacts, object)),
         }
-    }
-}
-
-/// The direction that the palm faces away from most. Of several, the first axis.
-fn side_of(grasp: &Grasp) -> Side {
-    let away = grasp.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
-    let axis = away.abs().max_position();
-    Side {
-        axis: axis as u8,
-        is_negative: away[axis] < 0.0,
     }
 }
 

@@ -178,9 +178,6 @@ impl<'a> Scene<'a> {
     }
 
     /// A hand proposed by `GUIDED` search, with the palm settled on its target.
-    ///
-    /// # Errors
-    /// The object offers no placement, or the stop came.
     pub(super) fn guided_proposal(
         &self,
         stream: &mut AttemptStream,

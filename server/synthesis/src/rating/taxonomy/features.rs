@@ -17,12 +17,10 @@ use crate::{
     },
 };
 
-/// Length below which a vector has no direction. Applies to sums of unit vectors and to distances in hand lengths, where it is
-/// 0.2 mm on an adult's hand.
+/// Length below which a vector has no direction.
 const MIN_LENGTH: f32 = 1e-3;
 
-/// Sine of the angle off a link's pad over which a contact turns from pad to side: about 30° to 60°. Smaller values count more
-/// pad contacts as side contacts.
+/// Sine of the angle off a link's pad over which a contact turns from pad to side: about 30° to 60°.
 const SIDE: [f32; 2] = [0.5, 0.87];
 
 /// Component of [`Touch::local`] along the link over which a contact turns from pad to tip: pushes about 30° to 50° off the pad's
@@ -33,12 +31,10 @@ const TIP: [f32; 2] = [0.26, 0.43];
 /// three digits. Larger values require more exactly opposite presses.
 const OPPOSED: [f32; 2] = [0.0, 0.5];
 
-/// Minimum negative cosine between two pushes for their distance to count as a thickness: 105° apart. A larger one leaves more
-/// grasps without a thickness.
+/// Minimum negative cosine between two pushes for their distance to count as a thickness: 105° apart.
 const THICKNESS_OPPOSITION: f32 = 0.25;
 
-/// Power with which such pairs count more, the more opposed they are. A larger one follows the most opposed pair, which a slight
-/// change of the hand may replace by another.
+/// Power with which such pairs count more, the more opposed they are.
 const THICKNESS_POWER: i32 = 2;
 
 /// Weight of the diameter of the held part itself, which decides where no contacts are opposed: a fifth of that of an exactly

@@ -25,8 +25,7 @@ use crate::{
     },
 };
 
-/// Share of the best rival's fit that is subtracted from the winner's if the two are not kin: a tie halves the confidence. A
-/// larger one requires a clearer lead.
+/// Share of the best rival's fit that is subtracted from the winner's if the two are not kin: a tie halves the confidence.
 const DOUBT: f32 = 0.5;
 
 /// The same share for kin. An expert who prefers the rival still accepts the winner.
@@ -285,9 +284,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// How well the touching fingers match those of a cell. Against the palm, one outer finger more or less matters little. Against
-/// the thumb, a set shifted by one finger still fits in part: a pinch with the middle finger is one, with the ring finger it is
-/// not. A gap between touching fingers matters more.
+/// How well the touching fingers match those of a cell. Against the palm, one outer finger more or less matters little.
 #[expect(
     clippy::match_same_arms,
     reason = "palm and thumb oppositions are grouped separately"

@@ -55,9 +55,6 @@ impl FailedCheck {
 }
 
 /// The grasp of a hand as it is, which may be closer to other people's hands by `grace` metres.
-///
-/// # Errors
-/// The first check that it fails.
 pub(in crate::search) fn held(
     reading: &Reading<'_>,
     grace: f32,

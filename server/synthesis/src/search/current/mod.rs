@@ -17,7 +17,6 @@ use super::{
     GraspSource, SearchOutcome,
     key_frames::withdrawal,
     known_grips::grasp_value,
-    prepare,
     scene::{Scene, Task},
     settings::SearchSettings,
 };
@@ -271,7 +270,7 @@ pub fn nearest_grasp(
         is_committed: false,
         grace: Grace::default(),
     });
-    let scene = prepare(task, &settings);
+    let scene = Scene::new(task, &settings);
     let around = scene.surroundings()?;
     let mut gripper = Gripper::default();
     if let Ok(grasp) = around.hold_posed(&hand, &mut gripper) {

@@ -43,8 +43,7 @@ const ALIKE: f32 = 2.0 * SAME / METRES_PER_RADIAN;
 /// Steps of an entry's score.
 const QUANTA: f32 = 254.0;
 
-/// How much higher than estimated a score may be: gravity is up to 18° from the direction that an entry was rated under. More
-/// checks more grips in vain.
+/// How much higher than estimated a score may be: gravity is up to 18° from the direction that an entry was rated under.
 const ESTIMATE_SLACK: f32 = 0.05;
 
 /// A current grasp that is kept or adjusted, and the verdict on it.
@@ -291,9 +290,6 @@ impl<'a> Replanner<'a> {
     }
 
     /// The grasp of a hand as it is, which may be closer to other people's hands by `grace` metres.
-    ///
-    /// # Errors
-    /// The first check that it fails.
     pub(super) fn hold(
         &self,
         pose: &HandPose,

@@ -14,12 +14,10 @@ use crate::{
     },
 };
 
-/// A part is not halved further if nothing travels farther than this in half of it, in metres: the accuracy of the check. Less
-/// costs time where a hand passes close by.
+/// A part is not halved further if nothing travels farther than this in half of it, in metres: the accuracy of the check.
 const RESOLUTION: f32 = 0.0001;
 
-/// Search distance beyond the known lower bound of an obstacle's distance, in metres. Less halves parts needlessly, more searches
-/// for obstacles in vain.
+/// Search distance beyond the known lower bound of an obstacle's distance, in metres.
 const LOOKAHEAD: f32 = 0.008;
 
 /// What a moving hand may collide with.

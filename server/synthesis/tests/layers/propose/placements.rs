@@ -142,8 +142,8 @@ fn attempts_beyond_the_cache_draw_as_without_it() {
     assert!(cached > ROWS as usize / 2, "{cached}");
 }
 
-fn holds_freely(object: &GraspObject, proposal: &Proposal, attempt: &mut PhysicalAttempt) -> bool {
-    holds(attempt, &surroundings(object, &NO_GIVER, right()), proposal)
+fn holds_freely(object: &GraspObject, proposal: &Proposal, gripper: &mut Gripper) -> bool {
+    holds(gripper, &surroundings(object, &NO_GIVER, right()), proposal)
 }
 
 #[test]
@@ -151,7 +151,7 @@ fn hands_rated_better_hold_more_often() {
     for name in OBJECT_NAMES {
         let object = object(name);
         let bulk = ObjectFeatures::of(object);
-        let mut attempt = PhysicalAttempt::default();
+        let mut gripper = Gripper::answering();
         let mut rated: Vec<(f32, bool)> = (0..6000)
             .filter_map(|index| {
                 let candidate =
@@ -162,7 +162,7 @@ fn hands_rated_better_hold_more_often() {
                     candidate.object_from_wrist,
                     Barriers::NONE,
                 );
-                let holds = holds_freely(object, &candidate.proposal(), &mut attempt);
+                let holds = holds_freely(object, &candidate.proposal(), &mut gripper);
                 Some((TRAINED.log_odds(&features), holds))
             })
             .collect();

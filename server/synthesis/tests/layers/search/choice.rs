@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use grasp_synthesis::search::{
     FoundGrasp, GraspObserver,
-    report::{Alternative, Alternatives, Class, Differences, Part, Side},
+    report::{Alternative, Alternatives, Class, Differences, Part},
 };
 
 use crate::prelude::*;
@@ -77,10 +77,7 @@ fn made_up(random: &mut Random, grasp: &Grasp, number: usize) -> Vec<Alternative
     (0..number)
         .map(|index| {
             let handedness = [Handedness::Left, Handedness::Right][random.index(2)];
-            let side = Side {
-                axis: random.index(3) as u8,
-                is_negative: random.index(2) == 0,
-            };
+            let side = random.index(6) as u8;
             Alternative {
                 class: Class {
                     approach: Some((side, handedness)),
@@ -167,18 +164,17 @@ fn the_side_is_the_one_that_the_back_of_the_hand_faces() {
     let object = bar();
     let mut grasp = any_grasp();
     // The palm faces +z of the wrist, so the back of the hand faces -z.
-    for (back, axis, is_negative) in [
-        (Vec3::new(0.9, 0.3, -0.2), 0, false),
-        (Vec3::new(-0.5, 0.1, 0.4), 0, true),
-        (Vec3::new(0.1, 0.8, 0.6), 1, false),
-        (Vec3::new(0.1, -0.8, 0.6), 1, true),
-        (Vec3::new(0.2, 0.1, 0.3), 2, false),
-        (Vec3::new(0.2, 0.1, -0.3), 2, true),
+    for (back, side) in [
+        (Vec3::new(0.9, 0.3, -0.2), 0),
+        (Vec3::new(-0.5, 0.1, 0.4), 1),
+        (Vec3::new(0.1, 0.8, 0.6), 2),
+        (Vec3::new(0.1, -0.8, 0.6), 3),
+        (Vec3::new(0.2, 0.1, 0.3), 4),
+        (Vec3::new(0.2, 0.1, -0.3), 5),
     ] {
         let orientation = Quat::from_rotation_arc(Vec3::NEG_Z, back.normalize_or(Vec3::X));
         grasp.pose.frame_from_wrist = Pose::new(Vec3::ZERO, orientation);
         let class = Class::of(&grasp, Handedness::Left, &object, BY_SIDE);
-        let side = Side { axis, is_negative };
         assert_eq!(class.approach, Some((side, Handedness::Left)));
         assert_eq!((class.grasp_type, class.region), (None, None));
     }
@@ -305,15 +301,16 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
     let around = surroundings(scissors, &NO_GIVER, right());
     let place = place(scissors, right());
     let free = floating(Arc::clone(scissors));
-    let (mut plain, mut refining) = (PhysicalAttempt::default(), PhysicalAttempt::default());
+    let (mut plain, mut refining) = (Gripper::answering(), Gripper::answering());
     let (mut held, mut refined) = (0, 0);
     for index in 0..PROPOSALS {
         let mut stream = AttemptStream::new(17, index);
         let Some(proposal) = propose(&place, &mut stream, Stop::NEVER) else {
             continue;
         };
-        let first = plain.hold(&around, &proposal, &mut Stopwatch::off(), Stop::NEVER);
-        let end = refining.hold_or_refine(
+        let first = around.hold(&proposal, &mut plain, &mut Stopwatch::off(), Stop::NEVER);
+        let end = hold_or_refine(
+            &mut refining,
             &around,
             &proposal,
             &mut stream,
@@ -326,12 +323,12 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
                 refined += 1;
                 assert!(guided(&free).judge(&grasp.pose).is_valid(), "{index}");
                 // It is not the proposed hand.
-                assert_ne!(grasp.pose.digits.as_slice(), plain.gripper.posed.as_slice());
+                assert_ne!(grasp.pose.digits.as_slice(), plain.posed.as_slice());
             }
             // Whatever was tried, a failed hand is reported as without refinement.
             (first, end) => {
                 assert_eq!(first, end, "{index}");
-                assert_eq!(plain.gripper.posed, refining.gripper.posed, "{index}");
+                assert_eq!(plain.posed, refining.posed, "{index}");
             }
         }
     }

@@ -2,7 +2,6 @@
 
 use grasp_assets::holdouts::Origin;
 use grasp_synthesis::search::{
-    LookUp,
     evaluation::{HINDRANCES, SIDES},
     verdicts::Against,
 };
@@ -10,7 +9,7 @@ use grasp_synthesis::search::{
 use crate::prelude::*;
 
 /// A look-up under a clock that advances by a microsecond per reading.
-fn look_up(search: &Search<'_>, within: Duration) -> LookUp {
+fn look_up(search: &Search<'_>, within: Duration) -> Result<SearchOutcome, usize> {
     search.look_up(&FakeClock::ticking(1_000), within)
 }
 
@@ -31,8 +30,8 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
         let mut last = None;
         let in_parts = loop {
             match look_up(&search, Duration::from_micros(3)) {
-                LookUp::Found(outcome) => break Some(outcome),
-                LookUp::NotFound { tried } => {
+                Ok(outcome) => break Some(outcome),
+                Err(tried) => {
                     if last == Some(tried) {
                         break None;
                     }
@@ -44,7 +43,7 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
             }
         };
         let by_search = search.run_on(&pool);
-        match (whole.clone().found(), in_parts) {
+        match (whole.clone().ok(), in_parts) {
             (Some(whole), Some(in_parts)) => {
                 assert_eq!(
                     (whole.grasp.as_ref(), whole.report.source),
@@ -58,10 +57,7 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
             }
             (None, None) => {
                 assert_eq!(by_search.grasp, None);
-                let LookUp::NotFound { tried } = whole else {
-                    unreachable!("nothing was found")
-                };
-                assert_eq!(last, Some(tried));
+                assert_eq!(last, whole.err());
                 nothing += 1;
             }
             (whole, in_parts) => panic!("giver {giver}: {whole:?}, in parts {in_parts:?}"),
@@ -277,10 +273,8 @@ fn look_ups_find_a_grip_exactly_where_one_is_clear_of_everything() {
             holdout.obstacles.extend(more.obstacles);
         }
         let search = guided(&holdout).atlas(&REMOTE).reproducible(false);
-        let outcome = search
-            .look_up(&FakeClock::default(), Duration::from_secs(1))
-            .found();
-        if let Some(outcome) = outcome {
+        let outcome = search.look_up(&FakeClock::default(), Duration::from_secs(1));
+        if let Ok(outcome) = outcome {
             let grasp = outcome.grasp.expect("it was found");
             assert!(matches!(outcome.report.source, Some(GraspSource::Atlas(_))));
             assert_is_clear(setting, &holdout, &grasp);
