@@ -135,7 +135,7 @@ fn proposals(criterion: &mut Criterion) {
         let scene = scene(object(name));
         let place = ProposalContext {
             object: scene.object,
-            surface: object(name).surface_pairs(),
+            surface: &object(name).surface_pairs,
             barriers: Barriers::NONE,
             chooses: None,
             rig: rig(),

@@ -7,8 +7,6 @@
 //! A round's proposals depend only on the rounds before it, and their results are admitted in order. So an atlas is the same for
 //! any number of threads and any interruptions.
 
-mod grown;
-
 use std::{cmp::Reverse, sync::Arc};
 
 use glam::Vec3;
@@ -16,7 +14,7 @@ use glam::Vec3;
 use super::{
     atlas::{Atlas, Grips, stamp},
     entry::Entry,
-    excerpt::{Wanted, excerpt},
+    excerpt::{Wanted, excerpt, times_listed},
     seeds::Seeds,
     spread::{Admission, Cell, Occupancy, Spread, base_score},
 };
@@ -27,7 +25,8 @@ use crate::{
         stopwatch::Stopwatch,
     },
     model::{
-        hand::joints::HandJoints,
+        hand::{joints::HandJoints, rig::Rig},
+        object::GraspObject,
         regions::suits_owner,
         score::{Term, grip_total},
         strategy::Validity,
@@ -50,8 +49,6 @@ use crate::{
         taxonomy::classify,
     },
 };
-
-pub use self::grown::Grown;
 
 /// Grips of a complete atlas. More offer more choice, and cost time and about 1.3 kilobytes each.
 pub const ENTRIES: usize = 8192;
@@ -291,8 +288,8 @@ impl<'a> Growth<'a> {
         let seeds = (clear.count() < ENOUGH_CLEAR_GRIPS)
             .then(|| unstopped(|stop| Seeds::of(&self.grips, self.rig, all, barriers, stop)));
         Some(Giver {
-            surface: self.prepared.surface_pairs().free_of(barriers),
-            wanted: self.prepared.wanted_pairs().free_of(barriers),
+            surface: self.prepared.surface_pairs.free_of(barriers),
+            wanted: self.prepared.wanted_pairs.free_of(barriers),
             presented: Presented {
                 giver: Some(hand),
                 ..Presented::alone(Vec3::Y)
@@ -338,9 +335,9 @@ impl<'a> Growth<'a> {
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
         let is_perturbed = !self.is_empty() && stream.unit() < PERTURBED_SHARE;
-        let wanted = giver.map_or(self.prepared.wanted_pairs(), |giver| &giver.wanted);
-        let is_wanted = !wanted.pairs().is_empty() && stream.unit() < WANTED_SHARE;
-        let anywhere = giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface);
+        let wanted = giver.map_or(&self.prepared.wanted_pairs, |giver| &giver.wanted);
+        let is_wanted = !wanted.pairs.is_empty() && stream.unit() < WANTED_SHARE;
+        let anywhere = giver.map_or(&self.prepared.surface_pairs, |giver| &giver.surface);
         let place = ProposalContext {
             object: self.scene.object,
             surface: if is_wanted { wanted } else { anywhere },
@@ -350,7 +347,7 @@ impl<'a> Growth<'a> {
             placements: None,
         };
         match giver.map(|giver| &giver.seeds) {
-            Some(Some(seeds)) if is_perturbed => seeds.propose_evenly(self.grips.entries(), &place, stream),
+            Some(Some(seeds)) if is_perturbed => seeds.propose(self.grips.entries(), true, &place, stream),
             None if is_perturbed => Some(self.perturbed_known(stream)),
             // Perturbing known grips is wasted on a giver with enough clear ones: most of them collide.
             _ if self.prepared.parts().is_handled && stream.unit() < HANDLE_SHARE => {
@@ -405,5 +402,85 @@ impl<'a> Growth<'a> {
         self.spread.record(cell, self.len(), base_score(&entry));
         self.grips.push(self.rig, entry);
         self.shapes.push(shape);
+    }
+}
+
+/// Grips that are shipped with an object or a primitive, at about 230 bytes each.
+const SHIPPED: usize = 320;
+
+/// The state of a growth, with everything needed to resume it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grown {
+    /// The grips.
+    pub atlas: Arc<Atlas>,
+    /// The shape that each grip's hand was closed from.
+    pub(super) shapes: Vec<HandShape>,
+    /// Proposals tried; 0 if these are the listed grips of another atlas.
+    pub proposed: u64,
+    /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before.
+    pub early_stamp: u64,
+    /// Of a growth that goes on: that of the other hand, if these grips are its mirror images.
+    pub(super) original: Option<Arc<Self>>,
+}
+
+impl Grown {
+    /// The growth that goes on: itself, or that of which it is the mirror image.
+    pub fn original(&self) -> &Self {
+        self.original.as_deref().unwrap_or(self)
+    }
+
+    /// The grips on any shortlist, as an incomplete atlas: nearly every giver leaves some of these few free. Resuming from it
+    /// does not continue the growth of the atlas, but starts over.
+    #[must_use]
+    pub fn listed(&self, object: &GraspObject, rig: &Rig) -> Self {
+        let listed = self.times_listed(object, rig).into_iter();
+        self.only(rig, listed.map(|(entry, _)| entry))
+    }
+
+    /// The grips that are on most shortlists, likewise: as many as are shipped.
+    #[must_use]
+    pub fn most_listed(&self, object: &GraspObject, rig: &Rig) -> Self {
+        let mut by_count = self.times_listed(object, rig);
+        by_count.sort_by_key(|&(entry, times)| (Reverse(times), entry));
+        let most = by_count.into_iter().take(SHIPPED);
+        let mut most: Vec<u16> = most.map(|(entry, _)| entry).collect();
+        most.sort_unstable();
+        self.only(rig, most.into_iter())
+    }
+
+    /// The listed grips, ascending, each with the number of shortlists that it is on.
+    fn times_listed(&self, object: &GraspObject, rig: &Rig) -> Vec<(u16, usize)> {
+        let entries = self.atlas.entries();
+        times_listed(entries, &Occupancy::of(object, rig, entries))
+    }
+
+    /// The same grips as a complete atlas.
+    #[must_use]
+    pub fn completed(self) -> Self {
+        Self {
+            atlas: Arc::new(Arc::unwrap_or_clone(self.atlas).completed()),
+            ..self
+        }
+    }
+
+    /// Some of the grips as an incomplete atlas.
+    fn only(&self, rig: &Rig, places: impl Iterator<Item = u16>) -> Self {
+        let places = places.map(usize::from);
+        let (entries, shapes) = places
+            .map(|place| (self.atlas.entries()[place].clone(), self.shapes[place]))
+            .unzip();
+        Self {
+            atlas: Arc::new(Atlas::new(Grips::new(rig, entries), false)),
+            shapes,
+            proposed: 0,
+            early_stamp: self.early_stamp,
+            original: None,
+        }
+    }
+
+    /// Memory use in bytes.
+    pub fn bytes(&self) -> usize {
+        let of_original = self.original.as_ref().map_or(0, |original| original.bytes());
+        self.atlas.bytes() + size_of_val(self.shapes.as_slice()) + of_original
     }
 }

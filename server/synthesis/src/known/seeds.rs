@@ -67,7 +67,7 @@ pub struct Seed {
 /// The known grips that are nearest to being clear of the barriers, by the clearance of palm, forearm, thumb and the finger
 /// subset that is farthest from them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seeds(Vec<Seed>);
+pub struct Seeds(pub Vec<Seed>);
 
 impl Seeds {
     /// Selects from `candidates`, indices into the entries of `known`; earlier ones win ties. Without
@@ -124,36 +124,23 @@ impl Seeds {
         Ok(Self(nearest.into_iter().map(|(_, seed)| seed).collect()))
     }
 
-    /// The seeds, by falling clearance.
-    pub fn all(&self) -> &[Seed] {
-        &self.0
-    }
-
-    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; `None` if none is drawn. `entries`
-    /// are those that the seeds index.
+    /// A perturbed hand that may be clear of the barriers, if one is drawn: near any seed, as serves many givers, if `evenly`, else
+    /// more often near the first. `entries` are those that the seeds index.
     pub fn propose(
         &self,
         entries: &[Entry],
+        evenly: bool,
         place: &ProposalContext<'_>,
         stream: &mut AttemptStream,
     ) -> Option<Proposal> {
-        // The first of 32 is drawn six times as often as under a uniform choice: holdouts that are quick to answer are answered
-        // sooner, the others no later.
-        let rank = (stream.unit().powi(2) * self.0.len() as f32) as usize;
+        let count = self.0.len();
+        let rank = match count {
+            0 if evenly => return None,
+            _ if evenly => stream.below(count),
+            // The first of 32 is drawn six times as often as under a uniform choice.
+            _ => (stream.unit().powi(2) * count as f32) as usize,
+        };
         Self::perturbed(*self.0.get(rank)?, entries, place, stream)
-    }
-
-    /// The same with all seeds equally likely: what serves many givers should not concentrate on a few seeds.
-    pub fn propose_evenly(
-        &self,
-        entries: &[Entry],
-        place: &ProposalContext<'_>,
-        stream: &mut AttemptStream,
-    ) -> Option<Proposal> {
-        if self.0.is_empty() {
-            return None;
-        }
-        Self::perturbed(self.0[stream.below(self.0.len())], entries, place, stream)
     }
 
     /// A hand perturbed from a known grip that may be clear of the barriers, if one is drawn.

@@ -163,7 +163,7 @@ impl Mirror {
             ];
             middles.map(|point| Self { point, normal })
         });
-        let points = object.surface_pairs().points();
+        let points = &object.surface_pairs.points;
         let stride = points.len().div_ceil(COMPARED_POINTS).max(1);
         let is_symmetric = |mirror: &Self| {
             let is_central = mirror

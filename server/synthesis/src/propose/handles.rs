@@ -215,7 +215,8 @@ pub struct HangingPlace {
 /// The places by which an object hangs under one direction of gravity.
 #[derive(Clone, Debug, Default)]
 pub struct HangingPlaces {
-    places: Vec<HangingPlace>,
+    /// The places, in no particular order.
+    pub places: Vec<HangingPlace>,
     /// Unit vector against gravity, in the object's frame.
     up: Vec3,
 }
@@ -239,7 +240,7 @@ impl HangingPlaces {
     pub fn of(object: &GraspObject, pairs: &SurfacePairs, up: Vec3, stop: Stop<'_>) -> Result<Self, Stopped> {
         let swing = |point: Vec3| (point - object.centre_of_mass).angle_between(up);
         let mut thin: Vec<&SurfacePair> = pairs
-            .pairs()
+            .pairs
             .iter()
             .filter(|pair| pair.thickness <= MAX_THICKNESS && swing(pair.middle()) <= MAX_SWING)
             .collect();
@@ -254,11 +255,6 @@ impl HangingPlaces {
             places.extend(place.filter(|place| place.swing <= MAX_SWING));
         }
         Ok(Self { places, up })
-    }
-
-    /// The places, in no particular order.
-    pub fn places(&self) -> &[HangingPlace] {
-        &self.places
     }
 
     /// Places a hooked hand whose palm and forearm satisfy `fits`. Returns `None` if there is nothing to hang by, or no drawn

@@ -134,7 +134,7 @@ pub struct Oppositions {
     /// Their widths in metres, contiguous for binary search.
     widths: Vec<f32>,
     /// Inner spheres of palm and forearm, in the wrist's frame.
-    inner_spheres: [Spheres; INNER_SPHERE_GROUPS],
+    pub(super) inner_spheres: [Spheres; INNER_SPHERE_GROUPS],
 }
 
 impl Oppositions {
@@ -162,11 +162,6 @@ impl Oppositions {
             by_width,
             inner_spheres: Spheres::of_all(&[of_palm.as_flattened(), of_forearm.as_flattened()].concat()),
         }
-    }
-
-    /// Inner spheres of palm and forearm, in the wrist's frame.
-    pub fn inner_spheres(&self) -> &[Spheres] {
-        &self.inner_spheres
     }
 
     /// Draws an opposition whose width in metres is between `min` and `max`; `None` if the rig has none.
@@ -214,9 +209,15 @@ const MOVES_THUMB: [bool; 5] = [true, true, false, true, false];
 /// The opposed pads of a hand.
 #[derive(Clone, Copy, Debug)]
 struct Pads {
-    /// Thumb and fingers: a point on the skin in metres and the direction it faces, in the wrist's frame.
-    thumb: (Vec3, Vec3),
-    fingers: (Vec3, Vec3),
+    thumb: Pad,
+    fingers: Pad,
+}
+
+/// A point on a pad's skin in metres and the direction it faces, in the wrist's frame.
+#[derive(Clone, Copy, Debug)]
+struct Pad {
+    skin: Vec3,
+    facing: Vec3,
 }
 
 impl OpposingHand {
@@ -261,17 +262,12 @@ impl OpposingHand {
         let changed = stream.below(parameters.len());
         parameters[changed] = (parameters[changed] + stream.between(-size, size)).clamp(0.0, 1.0);
         let stepped = self.with_parameters(parameters);
-        let pads = if MOVES_THUMB[changed] {
-            Pads {
-                thumb: stepped.thumb_pad(rig),
-                ..*pads
-            }
+        let mut pads = *pads;
+        if MOVES_THUMB[changed] {
+            pads.thumb = stepped.pad(rig, Digit::Thumb);
         } else {
-            Pads {
-                fingers: stepped.fingers_pad(rig),
-                ..*pads
-            }
-        };
+            pads.fingers = stepped.fingers_pad(rig);
+        }
         (stepped, pads)
     }
 
@@ -303,45 +299,45 @@ impl OpposingHand {
 
     fn pads(&self, rig: &Rig) -> Pads {
         Pads {
-            thumb: self.thumb_pad(rig),
+            thumb: self.pad(rig, Digit::Thumb),
             fingers: self.fingers_pad(rig),
         }
     }
 
-    fn thumb_pad(&self, rig: &Rig) -> (Vec3, Vec3) {
-        pad(
-            rig,
-            Digit::Thumb,
-            &self.shape,
-            2,
-            self.closed[0],
-            self.positions[0],
-        )
-    }
-
-    fn fingers_pad(&self, rig: &Rig) -> (Vec3, Vec3) {
-        let finger = |digit| {
-            pad(
-                rig,
-                digit,
-                &self.shape,
-                self.finger_link,
-                self.closed[1],
-                self.positions[1],
-            )
-        };
+    fn fingers_pad(&self, rig: &Rig) -> Pad {
         // The two fingers next to the thumb decide; the others follow.
         let mut fingers = rig.fingers();
-        let first = finger(fingers.next().unwrap_or(Digit::Index));
+        let first = self.pad(rig, fingers.next().unwrap_or(Digit::Index));
         match fingers.next().filter(|second| self.shape.closing[second.index()]) {
             Some(second) if !self.index_alone => {
-                let second = finger(second);
-                (
-                    (first.0 + second.0) * 0.5,
-                    (first.1 + second.1).normalize_or_zero(),
-                )
+                let second = self.pad(rig, second);
+                Pad {
+                    skin: (first.skin + second.skin) * 0.5,
+                    facing: (first.facing + second.facing).normalize_or_zero(),
+                }
             }
             _ => first,
+        }
+    }
+
+    fn pad(&self, rig: &Rig, digit: Digit) -> Pad {
+        let of_thumb = digit == Digit::Thumb;
+        let link = if of_thumb { 2 } else { self.finger_link };
+        let along = self.positions[usize::from(!of_thumb)];
+        let digit_rig = rig.digit(digit);
+        let radii = link_radii(rig, digit);
+        let angles = self
+            .shape
+            .flexing(rig, digit)
+            .closed_by(self.closed[usize::from(!of_thumb)]);
+        let frame = digit_frames(digit_rig, Pose::IDENTITY, angles).links[link];
+        let radius = radii[link] + (radii[link + 1] - radii[link]) * along;
+        // The last link's solid ends at the centre of the tip's sphere.
+        let beyond = if link == 2 { radii[3] } else { 0.0 };
+        let on_skin = Vec3::new(0.0, along * (digit_rig.lengths[link] - beyond), radius);
+        Pad {
+            skin: frame.transform_point(on_skin),
+            facing: frame.transform_vector(Vec3::Z),
         }
     }
 
@@ -355,8 +351,8 @@ impl OpposingHand {
                 ..self.shape
             },
             closed: self.closed,
-            thumb: pads.thumb.0,
-            fingers: pads.fingers.0,
+            thumb: pads.thumb.skin,
+            fingers: pads.fingers.skin,
             links: self.links(rig),
         })
     }
@@ -385,13 +381,13 @@ impl OpposingHand {
 
 impl Pads {
     fn width(&self) -> f32 {
-        self.thumb.0.distance(self.fingers.0)
+        self.thumb.skin.distance(self.fingers.skin)
     }
 
     /// Cosines between the line through the pads and the directions they face: 1 if they face each other.
     fn facing(&self) -> [f32; 2] {
-        let across = (self.fingers.0 - self.thumb.0).normalize_or_zero();
-        [across.dot(self.thumb.1), -across.dot(self.fingers.1)]
+        let across = (self.fingers.skin - self.thumb.skin).normalize_or_zero();
+        [across.dot(self.thumb.facing), -across.dot(self.fingers.facing)]
     }
 
     /// How far the pads are from opposing each other at a width; 0 once they do with some margin.
@@ -402,18 +398,4 @@ impl Pads {
             .map(|cos| (1.1 * min_facing_cos(width) - cos).max(0.0));
         width_error + 2.0 * (facing_errors[0] + facing_errors[1])
     }
-}
-
-/// A point on the skin of a link's pad in metres, and the direction it faces, in the wrist's frame.
-fn pad(rig: &Rig, digit: Digit, shape: &HandShape, link: usize, closed: f32, along: f32) -> (Vec3, Vec3) {
-    let digit_rig = rig.digit(digit);
-    let radii = link_radii(rig, digit);
-    let angles = shape.flexing(rig, digit).closed_by(closed);
-    let frames = digit_frames(digit_rig, Pose::IDENTITY, angles);
-    let frame = frames.links[link];
-    let radius = radii[link] + (radii[link + 1] - radii[link]) * along;
-    // The last link's solid ends at the centre of the tip's sphere.
-    let beyond = if link == 2 { radii[3] } else { 0.0 };
-    let on_skin = Vec3::new(0.0, along * (digit_rig.lengths[link] - beyond), radius);
-    (frame.transform_point(on_skin), frame.transform_vector(Vec3::Z))
 }

@@ -101,9 +101,12 @@ impl Deref for PreparedRig {
 #[derive(Debug)]
 pub struct PreparedObject {
     object: Arc<GraspObject>,
-    surface_pairs: SurfacePairs,
-    wanted: SurfacePairs,
-    holdable: HoldableSurface,
+    /// The points where opposed digits or the palm may press.
+    pub surface_pairs: SurfacePairs,
+    /// Those of them where the object's owner wants hands; empty if that is everywhere.
+    pub wanted_pairs: SurfacePairs,
+    /// Bounds on where it may be held.
+    pub holdable: HoldableSurface,
     /// A slot for each rig.
     placements: Mutex<Vec<CacheSlot>>,
 }
@@ -123,7 +126,7 @@ impl PreparedObject {
     /// [`Stopped`].
     pub fn new_until(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Self, Stopped> {
         let surface_pairs = SurfacePairs::of(&object, stop)?;
-        let wanted = if object.regions().require_contacts() {
+        let wanted_pairs = if object.regions().require_contacts() {
             surface_pairs.wanted(MAX_MISSED)
         } else {
             SurfacePairs::default()
@@ -134,7 +137,7 @@ impl PreparedObject {
         Ok(Self {
             object,
             surface_pairs,
-            wanted,
+            wanted_pairs,
             holdable,
             placements: Mutex::default(),
         })
@@ -142,28 +145,13 @@ impl PreparedObject {
 
     /// Memory use in bytes of what is derived from the plain object, placement caches of two hands included.
     pub fn derived_bytes(&self) -> usize {
-        let of_pairs = self.surface_pairs.bytes() + self.wanted.bytes();
+        let of_pairs = self.surface_pairs.bytes() + self.wanted_pairs.bytes();
         self.object.derived_bytes() + of_pairs + 2 * PlacementCache::MAX_BYTES
     }
 
     /// The object itself.
     pub fn object(&self) -> &Arc<GraspObject> {
         &self.object
-    }
-
-    /// The points where opposed digits or the palm may press.
-    pub fn surface_pairs(&self) -> &SurfacePairs {
-        &self.surface_pairs
-    }
-
-    /// Those of them where the object's owner wants hands; `None` if that is everywhere.
-    pub fn wanted_pairs(&self) -> &SurfacePairs {
-        &self.wanted
-    }
-
-    /// Bounds on where it may be held.
-    pub fn holdable(&self) -> &HoldableSurface {
-        &self.holdable
     }
 
     /// The placements at which a hand fits at the object and is likely to hold it. The first call for a rig takes about five
@@ -339,7 +327,7 @@ impl PlacementCache {
     fn of_until(object: &PreparedObject, rig: &PreparedRig, stop: Stop<'_>) -> Result<Self, Stopped> {
         let context = ProposalContext {
             object,
-            surface: object.surface_pairs(),
+            surface: &object.surface_pairs,
             barriers: Barriers::NONE,
             chooses: None,
             rig,

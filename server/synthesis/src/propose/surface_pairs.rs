@@ -105,9 +105,10 @@ impl SurfacePair {
 /// The sampled points and pairs of an object's surface, in the object's frame.
 #[derive(Clone, Debug, Default)]
 pub struct SurfacePairs {
-    pairs: Vec<SurfacePair>,
+    /// The pairs, in the order of the surface's triangles.
+    pub pairs: Vec<SurfacePair>,
     /// Points that may be touched, uniformly distributed over the surface.
-    points: Vec<SurfacePoint>,
+    pub points: Vec<SurfacePoint>,
 }
 
 impl SurfacePairs {
@@ -198,16 +199,6 @@ impl SurfacePairs {
         }
     }
 
-    /// The pairs, in the order of the surface's triangles.
-    pub fn pairs(&self) -> &[SurfacePair] {
-        &self.pairs
-    }
-
-    /// The points that may be touched.
-    pub fn points(&self) -> &[SurfacePoint] {
-        &self.points
-    }
-
     /// Share of the surface that lies opposite a part within a hand's span, from 0 to 1.
     pub fn spanned_share(&self) -> f32 {
         self.pairs.len() as f32 / self.points.len().max(1) as f32
@@ -281,7 +272,7 @@ impl HoldableSurface {
             forbidden_share: (forbidden_area / mesh.area()) as f32,
         };
         // Every pair of surface points opposes, and most objects have close ones.
-        if pairs.pairs().is_empty() && is_oriented(object) {
+        if pairs.pairs.is_empty() && is_oriented(object) {
             holdable.width = lower_bound(opposed_distance(mesh, is_allowed, CLOSE, FAR, stop)?);
             holdable.width_of_all = if object.forbidden_count() == 0 {
                 holdable.width

@@ -240,10 +240,12 @@ impl Attempt {
         let place = scene.place_of(scene.task.rig);
         for _ in 0..SEEDS_PER_ATTEMPT {
             stop.check()?;
-            let proposal = seeds.propose(entries, &place, course.stream).filter(|proposal| {
-                let wrist = proposal.object_from_wrist;
-                scene.admits_wrist(wrist) && place.is_chosen(wrist, course.stream)
-            });
+            let proposal = seeds
+                .propose(entries, false, &place, course.stream)
+                .filter(|proposal| {
+                    let wrist = proposal.object_from_wrist;
+                    scene.admits_wrist(wrist) && place.is_chosen(wrist, course.stream)
+                });
             course.stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };
             let gripper = &mut self.gripper;

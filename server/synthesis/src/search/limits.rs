@@ -93,7 +93,7 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
         return Vec::new();
     }
     let Task { holdout, object, rig } = task;
-    let holdable = object.holdable();
+    let holdable = &object.holdable;
     let friction = query.friction_on(&holdout.object);
     let span = rig.span();
     let of_region = |region: OrientedBox| {
@@ -104,7 +104,7 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
             .chain(arms_reach(holdout.stance));
         [
             torque_limit(holdout, &region, friction, span),
-            giver_limit(&Presented::of(holdout), object.surface_pairs(), rig),
+            giver_limit(&Presented::of(holdout), &object.surface_pairs, rig),
             reaches
                 .into_iter()
                 .find_map(|reach| reach_limit(reach, &region, rig)),
@@ -137,7 +137,7 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
     let stride = entries.len().div_ceil(MAX_COMPARED).max(1);
     let compared = || entries.iter().step_by(stride);
     let (blocked, all) = if entries.is_empty() {
-        let pairs = object.surface_pairs().pairs();
+        let pairs = &object.surface_pairs.pairs;
         let is_blocked = |pair: &SurfacePair| !pair.is_free_of(obstacles);
         let all_blocked = !obstacles.is_empty() && pairs.iter().all(is_blocked);
         (usize::from(all_blocked && !pairs.is_empty()), 1)
@@ -211,13 +211,13 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
     let digits = Digit::ALL.into_iter().filter(|&digit| rig.has(digit));
     let radii = digits.flat_map(|digit| link_radii(rig, digit));
     let needed = INSIDE_FINGER * radii.fold(f32::INFINITY, f32::min);
-    let sides: &[f32] = if surface.pairs().iter().any(SurfacePair::is_of_sheet) {
+    let sides: &[f32] = if surface.pairs.iter().any(SurfacePair::is_of_sheet) {
         &[1.0, -1.0]
     } else {
         &[1.0]
     };
     let mut room = 0.0_f32;
-    for point in surface.points() {
+    for point in &surface.points {
         for side in sides {
             let above: Vec3 = point.position + point.normal * (side * needed);
             room = room.max(giver.point_distance_upper_bound(above));
@@ -226,7 +226,7 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
             return None;
         }
     }
-    (!surface.points().is_empty()).then_some(Limit {
+    (!surface.points.is_empty()).then_some(Limit {
         check: Check::GiverClearance,
         value: room,
         bound: Some(needed),

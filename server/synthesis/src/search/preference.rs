@@ -105,7 +105,7 @@ impl Preference {
 /// True if an object has a region that its owner prefers by so much that contacts elsewhere do not suit, and hands have room
 /// there.
 fn is_preferred_region_free(object: &PreparedObject, barriers: Barriers<'_>) -> bool {
-    let wanted = object.wanted_pairs().pairs();
+    let wanted = &object.wanted_pairs.pairs;
     let compared = wanted
         .iter()
         .step_by(wanted.len().div_ceil(PAIRS_COMPARED).max(1));

@@ -114,19 +114,19 @@ impl SearchReport {
     }
 }
 
-/// Where a grasp came from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Where a grasp came from, in the order in which sources are tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum GraspSource {
-    /// A fresh attempt, by index.
-    Attempt(u64),
+    /// A preferred hand, by index.
+    Preferred(u16),
     /// A grip of the atlas, by index.
     Atlas(u16),
     /// A grip that an earlier search found, by index.
     Learned(u16),
     /// The current grasp, as it is or with digits moved out of the way.
     Current,
-    /// A preferred hand, by index.
-    Preferred(u16),
+    /// A fresh attempt, by index.
+    Attempt(u64),
 }
 
 impl GraspSource {
@@ -181,18 +181,7 @@ impl FoundGrasp {
         let (this, that) = (self.source, other.source);
         let by_value = self.value.total_cmp(&other.value);
         let by_rank = this.is_preferred().cmp(&that.is_preferred());
-        by_rank.then(by_value).then(order(that).cmp(&order(this)))
-    }
-}
-
-/// The order in which sources are tried.
-fn order(source: GraspSource) -> (u8, u64) {
-    match source {
-        GraspSource::Preferred(index) => (0, u64::from(index)),
-        GraspSource::Atlas(index) => (1, u64::from(index)),
-        GraspSource::Learned(index) => (2, u64::from(index)),
-        GraspSource::Current => (3, 0),
-        GraspSource::Attempt(index) => (4, index),
+        by_rank.then(by_value).then(that.cmp(&this))
     }
 }
 

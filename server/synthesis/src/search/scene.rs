@@ -165,7 +165,7 @@ impl<'a> Scene<'a> {
         let Task { object, .. } = self.task;
         ProposalContext {
             object: object.object(),
-            surface: object.surface_pairs(),
+            surface: &object.surface_pairs,
             barriers: self.barriers(),
             // Two hands carry from below and at the ends.
             chooses: self
@@ -266,7 +266,7 @@ impl<'a> Scene<'a> {
             return Ok(places);
         }
         let object = self.task.object;
-        let probed = HangingPlaces::of(object.object(), object.surface_pairs(), presented.up, stop)?;
+        let probed = HangingPlaces::of(object.object(), &object.surface_pairs, presented.up, stop)?;
         Ok(self.hanging_places.get_or_init(|| probed))
     }
 }
