@@ -1,9 +1,6 @@
-//! The binary format of atlases.
-//!
-//! A header (magic bytes, format, key, flags and counts), the grips, and the SHA-256 of everything before it. Numbers are
-//! big-endian and keep every bit, so decoding restores exactly the atlas that was encoded. Derived values are recomputed instead
-//! of stored: yaws and bend ratios from the hand's shape, a contact's third coordinate from its triangle, its normal from
-//! triangle and hand.
+//! The binary format of atlases: a header (magic bytes, format, key, flags and counts), the grips, and the SHA-256 of everything
+//! before it. Numbers are big-endian and keep every bit. Derived values are recomputed instead of stored: yaws and bend ratios from
+//! the hand's shape, a contact's third coordinate from its triangle, its normal from triangle and hand.
 
 mod algorithm;
 
@@ -186,7 +183,6 @@ trait Codec {
 
     fn bytes(&mut self, bytes: &mut [u8]) -> Result<(), AtlasError>;
 
-    /// Fails if a value that was read is not as it must be.
     fn ensure(&self, holds: bool, otherwise: &'static str) -> Result<(), AtlasError> {
         if holds || !Self::READS {
             Ok(())
@@ -213,7 +209,6 @@ trait Codec {
         Ok(())
     }
 
-    /// Finite numbers.
     fn floats<'a>(&mut self, numbers: impl IntoIterator<Item = &'a mut f32>) -> Result<(), AtlasError> {
         for number in numbers {
             let mut bytes = number.to_be_bytes();
@@ -288,11 +283,9 @@ impl Header {
     }
 }
 
-/// A grip as it is stored.
 struct Stored {
     grip: Grip,
     shape: HandShape,
-    /// The values of [`WRITTEN_TERMS`].
     terms: [f32; WRITTEN_TERMS.len()],
     scores: [u8; DIRECTIONS],
     friction_uses: [u64; 2],
@@ -430,7 +423,6 @@ impl Stored {
     }
 }
 
-/// A bit per digit.
 fn bits_of(digits: [bool; 5]) -> u8 {
     (0..5).map(|digit| u8::from(digits[digit]) << digit).sum()
 }

@@ -59,13 +59,8 @@ impl Entry {
         gripper: &mut Gripper,
     ) -> Self {
         let held = Self::of_held(scene, rig, grip, solids, gripper);
-        let Self {
-            grip,
-            contacts,
-            grip_values,
-            ..
-        } = &held;
-        let of_grip = grip_total(grip_values);
+        let (grip, contacts) = (&held.grip, &held.contacts);
+        let of_grip = grip_total(&held.grip_values);
         let mut friction_uses = FrictionUses::default();
         let scores = std::array::from_fn(|index| {
             let load = scene.load(&gripper.soft_contacts, direction(index));
@@ -191,16 +186,11 @@ impl Entry {
     pub fn on_resized(&self, scale: f32) -> Self {
         let mut resized = self.clone();
         let wrist = &mut resized.grip.pose.frame_from_wrist;
-        *wrist = self.way_on_resized(scale) * *wrist;
+        *wrist = way_with_contacts(&self.contacts, scale) * *wrist;
         for contact in &mut resized.contacts {
             contact.position *= scale;
         }
         resized
-    }
-
-    /// How the hand moves in [`Self::on_resized`].
-    pub fn way_on_resized(&self, scale: f32) -> Pose {
-        way_with_contacts(&self.contacts, scale)
     }
 
     /// The solids of the hand in the object's frame. Storing them would triple the size of an entry.
@@ -276,9 +266,7 @@ const _: () = assert!(DIRECTIONS == 64);
 /// The friction use for each of [`DIRECTIONS`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrictionUses {
-    /// Directions with more than sparing use, one bit each.
     more: u64,
-    /// Those of them with full use.
     all: u64,
 }
 
@@ -288,7 +276,6 @@ impl FrictionUses {
         (all & !more == 0).then_some(Self { more, all })
     }
 
-    /// The bits of [`FrictionUses::from_bits`].
     pub(super) fn to_bits(self) -> [u64; 2] {
         [self.more, self.all]
     }

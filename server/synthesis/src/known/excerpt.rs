@@ -50,16 +50,12 @@ type ClearOf = [u8; PLACES];
 /// The value of a grip for givers by the direction of their forearms; 0 if it lets the object slip.
 type Row = [u8; FOREARMS];
 
-/// The direction of the forearms of the givers of each chunk.
 type Chunks = [usize; PLACES / LANES];
 
-/// The value that the giver at each place is served with.
 type Served = [u8; PLACES];
 
-/// How givers are served under one direction of gravity.
 struct Direction {
     values: Vec<Row>,
-    /// What counts as not served.
     least: Served,
     served: Served,
 }
@@ -75,7 +71,6 @@ impl Direction {
     }
 }
 
-/// Grips with the givers that are clear of each.
 struct Candidates {
     chunks: Chunks,
     clear_of: Vec<ClearOf>,
@@ -139,7 +134,6 @@ impl Candidates {
         list
     }
 
-    /// Chooses as long as others serve a giver at all.
     fn fill(&mut self, count: usize, left: &mut Vec<u16>, chosen: &mut Vec<u16>) {
         while chosen.len() < count {
             let before = chosen.len();
@@ -151,11 +145,8 @@ impl Candidates {
     }
 }
 
-/// Grips of which some are kept in any case.
 pub(super) struct Wanted {
-    /// Their indices, ascending.
     pub(super) places: Vec<u16>,
-    /// How many of them are kept, if there are as many.
     pub(super) count: usize,
 }
 
@@ -234,12 +225,10 @@ fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<Cle
     (clear_of, chunks)
 }
 
-/// One of [`FOREARMS`] evenly spread directions.
 fn forearm(index: usize) -> Vec3 {
     direction(index * (DIRECTIONS / FOREARMS))
 }
 
-/// The index of the nearest one.
 fn nearest_forearm(along: Vec3) -> usize {
     let cosine = |&index: &usize| forearm(index).dot(along);
     (0..FOREARMS)
@@ -247,7 +236,6 @@ fn nearest_forearm(along: Vec3) -> usize {
         .unwrap_or(0)
 }
 
-/// The values of all grips for one direction against gravity.
 fn values(entries: &[Entry], up: usize) -> Vec<Row> {
     let receivers: [Receiver; FOREARMS] =
         std::array::from_fn(|giver| Receiver::facing(forearm(giver), Vec3::ZERO, direction(up)));
@@ -304,7 +292,6 @@ mod tests {
     use super::*;
     use crate::base::random::AttemptStream;
 
-    /// Givers whose forearms point in all directions.
     fn chunks() -> Chunks {
         std::array::from_fn(|chunk| chunk % FOREARMS)
     }

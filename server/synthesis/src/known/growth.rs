@@ -1,8 +1,6 @@
 //! Grows atlases in rounds of proposals, half of them fresh and half perturbed from known grips. At most a few similar grips are
-//! kept, the best ones (`spread.rs`).
-//!
-//! Every other round has a giver: a known grip plays the hand that holds the object out, and the round searches for grips clear
-//! of it. So the atlas also serves givers who leave little room.
+//! kept, the best ones (`spread.rs`). In every other round, a known grip plays the hand that holds the object out, so that the atlas
+//! also serves givers who leave little room.
 //!
 //! A round's proposals depend only on the rounds before it, and their results are admitted in order. So an atlas is the same for
 //! any number of threads and any interruptions.
@@ -95,7 +93,6 @@ const ENOUGH_CLEAR_GRIPS: usize = 60;
 /// Largest number of redraws of a grip from a crowded cell.
 const MAX_REDRAWS: usize = 8;
 
-/// The result of a proposal.
 type Outcome = Option<(Entry, HandShape)>;
 
 /// A known grip that plays the giver's hand.
@@ -109,7 +106,6 @@ struct Giver {
 }
 
 impl Giver {
-    /// True if too few known grips are clear of it.
     fn needs_grips(&self) -> bool {
         self.seeds.is_some()
     }
@@ -269,7 +265,6 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// The giver of this round, if it has one.
     fn draw_giver(&self) -> Option<Giver> {
         let round = self.proposed / ROUND;
         if self.len() < MIN_GRIPS_FOR_GIVERS || round.is_multiple_of(2) {
@@ -357,7 +352,6 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Draws a grip.
     fn draw_grip(&self, stream: &mut AttemptStream) -> usize {
         let mut index = stream.below(self.len());
         for _ in 0..MAX_REDRAWS {
@@ -371,7 +365,6 @@ impl<'a> Growth<'a> {
         index
     }
 
-    /// A hand perturbed from a known grip.
     fn perturbed_known(&self, stream: &mut AttemptStream) -> Proposal {
         let index = self.draw_grip(stream);
         let known = Proposal {
@@ -413,7 +406,6 @@ const SHIPPED: usize = 320;
 pub struct Grown {
     /// The grips.
     pub atlas: Arc<Atlas>,
-    /// The shape that each grip's hand was closed from.
     pub(super) shapes: Vec<HandShape>,
     /// Proposals tried; 0 if these are the listed grips of another atlas.
     pub proposed: u64,
@@ -457,13 +449,14 @@ impl Grown {
     /// The same grips as a complete atlas.
     #[must_use]
     pub fn completed(self) -> Self {
+        let mut atlas = Arc::unwrap_or_clone(self.atlas);
+        atlas.complete = true;
         Self {
-            atlas: Arc::new(Arc::unwrap_or_clone(self.atlas).completed()),
+            atlas: Arc::new(atlas),
             ..self
         }
     }
 
-    /// Some of the grips as an incomplete atlas.
     fn only(&self, rig: &Rig, places: impl Iterator<Item = u16>) -> Self {
         let places = places.map(usize::from);
         let (entries, shapes) = places

@@ -55,7 +55,6 @@ impl<'a> GripChecker<'a> {
         requirements.admits(&grasp).then(|| Box::new(grasp))
     }
 
-    /// The same without the requirements.
     pub(crate) fn check_holdout(
         &self,
         entry: &Entry,
@@ -107,7 +106,6 @@ impl<'a> GripChecker<'a> {
         Ok(grasp)
     }
 
-    /// The receiver's arm, if it must reach the grip.
     pub(crate) fn arm(&self, entry: &Entry) -> Result<Option<ArmPose>, Check> {
         let arm = self.around.required_arm(entry.grip.pose.frame_from_wrist);
         self.around

@@ -13,6 +13,7 @@ use super::{
     atlas::{Atlas, Grips},
     entry::Entry,
     finger_subsets::{FIRST, SECOND, of_digits, spheres, upper_bounds},
+    moved_grips::way_with_contacts,
     primitives::TransferredGrips,
 };
 use crate::{
@@ -96,7 +97,7 @@ impl Seeds {
         let mut by_upper_bound = Vec::new();
         for (count, index) in candidates.enumerate() {
             stop.check_every(bounds_per_check, count)?;
-            let clearance = known.clearance_upper_bound(usize::from(index), barriers);
+            let clearance = known.clearance_upper_bound(usize::from(index), None, barriers);
             by_upper_bound.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
         // A heap, because sorting would take longer than the interval between clock checks.
@@ -353,9 +354,9 @@ impl ResizedGrips {
     ) -> Result<Grips, Stopped> {
         let entry = |index: u16| &self.atlas.entries()[usize::from(index)];
         let clearance = |index: u16, barriers: Barriers<'_>| {
-            let way = entry(index).way_on_resized(self.scale);
+            let way = way_with_contacts(&entry(index).contacts, self.scale);
             let grips = self.atlas.grips();
-            grips.moved_clearance_upper_bound(usize::from(index), way, barriers)
+            grips.clearance_upper_bound(usize::from(index), Some(way), barriers)
         };
         let resized = |index: u16| entry(index).on_resized(self.scale);
         Grips::farthest(entries, clearance, resized, around, stop)

@@ -31,7 +31,6 @@ const MANY_FINGERS: usize = 3;
 pub(super) struct Cell(IVec3, [u8; 2], bool);
 
 impl Cell {
-    /// The cell of a hand that touches an object.
     pub(super) fn of(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> Self {
         let wrist = pose.frame_from_wrist;
         let palm = wrist.transform_point(rig.palm);
@@ -68,7 +67,6 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// What happens to a new grip of this cell and score.
     pub(super) fn admission(&self, cell: Cell, base_score: f32) -> Admission {
         let Some(alike) = self.cells.get(&cell).filter(|alike| alike.len() >= MAX_PER_CELL) else {
             return Admission::Add;
@@ -79,12 +77,10 @@ impl Spread {
         }
     }
 
-    /// The number of grips in a cell.
     pub(super) fn count_in(&self, cell: Cell) -> usize {
         self.cells.get(&cell).map_or(0, Vec::len)
     }
 
-    /// Records the grip at an index of the entries.
     pub(super) fn record(&mut self, cell: Cell, index: usize, base_score: f32) {
         let alike = self.cells.entry(cell).or_default();
         match alike.iter_mut().find(|(entry, _)| *entry == index) {
@@ -124,7 +120,6 @@ const LANES: usize = 8;
 /// A cell that no hand fills.
 const EMPTY: u16 = u16::MAX;
 
-/// One bit per grip.
 type Bits = Vec<u64>;
 
 /// For each cell around an object that hands fill, the grips of these.
@@ -136,7 +131,6 @@ fn has(grips: &Bits, entry: usize) -> bool {
 }
 
 impl Occupancy {
-    /// The cells that the hands of some grips fill.
     pub(super) fn of(object: &GraspObject, rig: &Rig, entries: &[Entry]) -> Self {
         let surface = object.surface.mesh().aabb();
         let low = surface.min - MARGIN;
@@ -177,13 +171,11 @@ impl Occupancy {
     }
 }
 
-/// The space around an object, divided into cells.
 struct Grid {
     low: Vec3,
     /// Edge of a cell in metres.
     edge: f32,
     counts: IVec3,
-    /// Each cell's place in `filled`, or [`EMPTY`].
     places: Vec<u16>,
     filled: Vec<Bits>,
     none: Bits,
@@ -252,7 +244,6 @@ impl Grid {
         self.filled[usize::from(self.places[cell])][entry / 64] |= 1 << (entry % 64);
     }
 
-    /// A point's cell along each axis.
     fn cell_coordinates(&self, point: Vec3) -> IVec3 {
         ((point - self.low) / self.edge).floor().as_ivec3()
     }

@@ -38,7 +38,6 @@ pub enum Aim {
 }
 
 impl Aim {
-    /// The better, the higher, for opposed pads.
     fn merit_of_pair(&self, pair: &SurfacePair) -> f32 {
         let middle = (pair.start + pair.end) * 0.5;
         match *self {
@@ -47,7 +46,6 @@ impl Aim {
         }
     }
 
-    /// The better, the higher, for a palm.
     fn merit_of_point(&self, point: &SurfacePoint) -> f32 {
         match *self {
             Self::Outside { centre, up } => {
@@ -94,7 +92,6 @@ fn flat_palm_shape(rig: &Rig, stream: &mut AttemptStream) -> HandShape {
     }
 }
 
-/// The one with the highest merit of [`COMPARED`] draws.
 fn best_of<T>(mut draw: impl FnMut() -> Option<T>, merit: impl Fn(&T) -> f32) -> Option<T> {
     (0..COMPARED)
         .map_while(|_| draw())
@@ -116,7 +113,6 @@ const COMPARED_POINTS: usize = 512;
 pub struct Mirror {
     /// A point of the plane, in metres.
     point: Vec3,
-    /// Its unit normal.
     normal: Vec3,
 }
 

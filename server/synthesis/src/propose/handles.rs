@@ -1,15 +1,13 @@
-//! Hands that wrap a handle ([`crate::geometry::handles`]) from the palm, and hands that hook their fingers below what an object
-//! may hang by.
-//!
-//! A place to hang by is a thin part above the centre of mass, with room below for a finger and free ways up on both sides of it,
-//! while the part itself goes on to the other two. Spheres of about a finger's thickness probe for that, so bars, wires, straps
-//! and sheets are all found alike.
+//! Hands that wrap a handle ([`crate::geometry::handles`]) from the palm, and hands that hook their fingers below what an object may
+//! hang by: a thin part above the centre of mass, with room below for a finger and free ways up on both sides of it, while the part
+//! itself goes on to the other two. Spheres of about a finger's thickness probe for that.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Mat3, Quat, Vec3};
 
 use super::{
+    opposition::drawn_set,
     proposal::{PALM_START_HEIGHT, ProposalContext, palm_shape},
     surface_pairs::{SurfacePair, SurfacePairs},
 };
@@ -306,17 +304,9 @@ impl HangingPlaces {
 }
 
 impl Hook {
-    /// A hook for a place.
     fn draw(rig: &Rig, place: &HangingPlace, stream: &mut AttemptStream) -> Self {
-        let mut height = if place.is_broad { stream.unit() } else { 1.0 };
-        let closing = FINGER_SETS
-            .iter()
-            .find(|(_, share)| {
-                height -= share;
-                height < 0.0
-            })
-            .map_or(FINGER_SETS[2].0, |(set, _)| *set);
-        let closing = rig.own_digits(closing);
+        let height = if place.is_broad { stream.unit() } else { 1.0 };
+        let closing = rig.own_digits(drawn_set(FINGER_SETS, height));
         let knuckle = stream.between(KNUCKLE_FLEXION[0], KNUCKLE_FLEXION[1]);
         let second = stream.between(MIDDLE_FLEXION[0], MIDDLE_FLEXION[1]);
         let mut shape = HandShape {

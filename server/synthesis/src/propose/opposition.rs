@@ -100,14 +100,9 @@ const PRESHAPE_OPENING: f32 = 0.22;
 
 /// Draws a hand shape of a rig for an object of a width in metres.
 pub fn draw_shape(rig: &Rig, width: f32, stream: &mut AttemptStream) -> HandShape {
-    let mut height = stream.unit();
-    let closing = FINGER_SETS
-        .iter()
-        .find(|(_, shares)| {
-            height -= shares[usize::from(width > PINCH_WIDTH)];
-            height < 0.0
-        })
-        .map_or(FINGER_SETS[3].0, |(set, _)| *set);
+    let is_thick = usize::from(width > PINCH_WIDTH);
+    let sets = FINGER_SETS.map(|(set, shares)| (set, shares[is_thick]));
+    let closing = drawn_set(sets, stream.unit());
     HandShape {
         thumb_yaw: stream.unit(),
         // The product makes wide spreads rare.
@@ -122,6 +117,15 @@ pub fn draw_shape(rig: &Rig, width: f32, stream: &mut AttemptStream) -> HandShap
     }
 }
 
+/// The set of digits that a number from 0 to 1 falls on by their shares; the last if they sum to less.
+pub(super) fn drawn_set<const N: usize>(sets: [([bool; 5], f32); N], mut height: f32) -> [bool; 5] {
+    let drawn = sets.iter().find(|(_, share)| {
+        height -= share;
+        height < 0.0
+    });
+    drawn.unwrap_or(&sets[N - 1]).0
+}
+
 fn min_facing_cos(width: f32) -> f32 {
     MIN_FACING_COS[usize::from(width > PINCH_WIDTH)]
 }
@@ -129,7 +133,6 @@ fn min_facing_cos(width: f32) -> f32 {
 /// The sampled oppositions of a rig.
 #[derive(Clone, Debug, Default)]
 pub struct Oppositions {
-    /// In ascending order of width.
     by_width: Vec<Opposition>,
     /// Their widths in metres, contiguous for binary search.
     widths: Vec<f32>,

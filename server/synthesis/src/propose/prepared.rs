@@ -107,11 +107,9 @@ pub struct PreparedObject {
     pub wanted_pairs: SurfacePairs,
     /// Bounds on where it may be held.
     pub holdable: HoldableSurface,
-    /// A slot for each rig.
     placements: Mutex<Vec<CacheSlot>>,
 }
 
-/// A rig and its cache once it is built.
 type CacheSlot = (PreparedRig, Arc<OnceLock<Arc<PlacementCache>>>);
 
 impl PreparedObject {
@@ -280,7 +278,6 @@ const MAX_RIGS: usize = 4;
 /// A hand that fits at the object, in a form that wastes no bytes on alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct CachedPlacement {
-    /// The index of its opposition among the rig's.
     opposition: u16,
     pair: SurfacePair,
     position: Vec3,

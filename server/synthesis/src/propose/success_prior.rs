@@ -1,10 +1,6 @@
-//! The success prior: a small network that estimates, before a hand is closed, how likely it is to hold. It was trained on random
-//! shapes.
-//!
-//! Closing the hand decides, but takes a hundred times longer. The network sees how the object's box and centre of mass lie in
-//! the hand, the object's thickness between the pads, the hand's shape, and how near the giver is to pads and palm. That suffices
-//! to prefer a mug's body or handle over its rim, on which most surface pairs lie. Its weights are data in `weights.txt`;
-//! `assets/PROVENANCE.md` says how they were trained.
+//! The success prior: a small network, trained on random shapes, that estimates before a hand is closed how likely it is to hold.
+//! Closing the hand decides, but takes a hundred times longer. Its weights are data in `weights.txt`; `assets/PROVENANCE.md` says how
+//! they were trained.
 
 use std::sync::LazyLock;
 
@@ -105,7 +101,6 @@ impl Network {
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectFeatures {
     centre_of_mass: Vec3,
-    /// Unit vector along the longest edge of its box.
     long_axis: Vec3,
     /// Logarithms of its box's half extents in metres, longest first.
     log_sizes: [f32; 3],

@@ -21,7 +21,7 @@ use crate::{
     },
     physical::{
         barriers::BarrierClearances,
-        both_hands::{HalfGrip, SharedHold, hold_together},
+        both_hands::{HalfGrip, hold_together},
         grip::{Grip, Gripper, PosedDigits, clear_of_barriers},
         immobility::{Balance, Buffers, balance},
         presented::{ObjectScene, Presented},
@@ -103,7 +103,6 @@ impl GraspContext<'_> {
         Ok(self.assess(&grip, &solids, gripper, stopwatch)?)
     }
 
-    /// Closes a proposed hand.
     pub(crate) fn close(
         &self,
         proposal: &Proposal,
@@ -153,7 +152,6 @@ impl GraspContext<'_> {
         Ok(classification)
     }
 
-    /// The hand's distances from what it keeps clear of.
     pub(super) fn clearances(
         &self,
         grip: &Grip,
@@ -164,7 +162,6 @@ impl GraspContext<'_> {
         clearances.ok_or(Rejection::FingerCollision)
     }
 
-    /// The grasp with its score, if the requirements admit it.
     pub(super) fn rated(
         &self,
         grasp: Grasp,
@@ -184,22 +181,18 @@ impl GraspContext<'_> {
     /// The grasp with its score. `relative_closure` is as for a rated one.
     #[must_use]
     pub(crate) fn scored(&self, mut grasp: Grasp, relative_closure: f32, solids: &HandSolids) -> Grasp {
-        let Self {
-            object,
-            presented,
-            rig,
-            ..
-        } = self;
-        let grip_values = grip_values(
+        let (object, rig) = (&self.object, self.rig);
+        let (pose, contacts, classification) = (&grasp.pose, &grasp.contacts, grasp.classification);
+        let values = grip_values(
             object,
             rig,
-            &grasp.pose,
-            &grasp.contacts,
-            grasp.classification,
+            pose,
+            contacts,
+            classification,
             relative_closure,
             solids,
         );
-        grasp.score = Some(score(grip_values, &grasp, object, rig, presented));
+        grasp.score = Some(score(values, &grasp, object, rig, self.presented));
         grasp
     }
 
@@ -209,7 +202,6 @@ impl GraspContext<'_> {
         object.admits_wrist(self.rig.handedness, object_from_wrist)
     }
 
-    /// The receiver's arm, if it must reach a wrist and does.
     pub(crate) fn required_arm(&self, wrist: Pose) -> Option<ArmPose> {
         let must_reach = self.presented.receiver.must_reach();
         must_reach
@@ -290,15 +282,9 @@ pub(crate) fn assess_both(
     let classifications = [classified(0)?, classified(1)?];
     let clearance = |hand: usize| around[hand].clearances(&halves[hand].grip, &halves[hand].solids);
     let clearances = [clearance(0)?, clearance(1)?];
-    let GraspContext {
-        object, presented, ..
-    } = around[0];
-    let held = hold_together(object, presented.up, halves, buffers, stopwatch)?;
-    let SharedHold {
-        epsilon,
-        relative_closure,
-        balances: [first, second],
-    } = held;
+    let presented = around[0].presented;
+    let held = hold_together(&around[0].object, presented.up, halves, buffers, stopwatch)?;
+    let [first, second] = held.balances;
     let total_force: glam::Vec3 = first.forces.iter().chain(&second.forces).sum();
     let rated = |hand: usize, balance| {
         let HalfGrip {
@@ -310,7 +296,7 @@ pub(crate) fn assess_both(
             grip,
             contacts,
             classifications[hand],
-            epsilon,
+            held.epsilon,
             balance,
             presented,
             clearances[hand],
@@ -319,12 +305,9 @@ pub(crate) fn assess_both(
             wrench_angle: total_force.angle_between(presented.up),
             ..unscored
         };
-        around[hand].rated(grasp, relative_closure, solids)
+        around[hand].rated(grasp, held.relative_closure, solids)
     };
-    let first = rated(0, first)?;
-    let second = rated(1, second)?;
-    Ok(Box::new(Grasp {
-        other_hand: Some(Box::new(second)),
-        ..first
-    }))
+    let mut grasp = Box::new(rated(0, first)?);
+    grasp.other_hand = Some(Box::new(rated(1, second)?));
+    Ok(grasp)
 }

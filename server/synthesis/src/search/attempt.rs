@@ -56,7 +56,6 @@ pub struct Attempt {
     thesis: ThesisAttempt,
     gripper: Gripper,
     both_hands: BothHands,
-    /// Whether the hand was placed on a handle or to hook in.
     is_special: bool,
 }
 
@@ -208,7 +207,6 @@ impl Attempt {
         held
     }
 
-    /// Two hands that hold the object together.
     fn try_both_hands(
         &mut self,
         around: &GraspContext<'_>,
@@ -259,7 +257,6 @@ impl Attempt {
     }
 }
 
-/// The wrist, if it meets the request's requirements.
 fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure> {
     if scene.admits_wrist(wrist.object_from_wrist) {
         Ok(*wrist)
@@ -322,7 +319,6 @@ const SYMMETRIC_SHARE: f32 = 0.75;
 /// The first hand of an attempt, as far as it got, and the buffers of both.
 #[derive(Clone, Debug)]
 struct BothHands {
-    /// Closes the first hand.
     first: Gripper,
     /// Where the first hand's wrist was placed; `None` if no placement fits.
     placed: Option<Pose>,
@@ -346,9 +342,7 @@ struct First<'a> {
     around: &'a GraspContext<'a>,
     proposal: Proposal,
     half: HalfGrip,
-    /// Its solids as an obstacle.
     obstacle: PreparedHand,
-    /// The middle of its contacts.
     place: Vec3,
 }
 
@@ -399,7 +393,6 @@ impl BothHands {
         Err(rejection.into())
     }
 
-    /// Draws and closes the first hand.
     fn hold_first<'a>(
         &mut self,
         around: &'a GraspContext<'_>,
@@ -441,7 +434,6 @@ impl BothHands {
         })
     }
 
-    /// Closes the other hand and checks that both hold together.
     fn complete(
         &mut self,
         first: &First<'_>,
@@ -469,7 +461,6 @@ impl BothHands {
     }
 }
 
-/// Closes one hand.
 fn close_half(
     gripper: &mut Gripper,
     around: &GraspContext<'_>,

@@ -117,7 +117,6 @@ pub fn key_frames(
     ])
 }
 
-/// The hand displaced.
 fn moved(pose: &HandPose, displacement: Vec3) -> HandPose {
     let Pose {
         position,
@@ -139,7 +138,6 @@ struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// The approach direction and the hand of `PRE_GRASP`.
     fn plan(&self) -> Option<(Vec3, HandPose)> {
         // Digits that hold nothing open with the others, or else stay where they are.
         let opening_digits = |i: usize| {
@@ -283,7 +281,6 @@ impl Planner<'_> {
             && self_clearance(self.rig, &solids.hand) >= 0.0
     }
 
-    /// True if the straight approach to an open hand is free.
     fn approach_is_free(&self, pre_grasp: &TrackedSolids, direction: Vec3) -> bool {
         let motion = Motion {
             solids_at: |share: f32| pre_grasp.moved(direction * (APPROACH_DISTANCE * (share - 1.0))),
@@ -405,15 +402,12 @@ const LOOKAHEAD: f32 = 0.008;
 /// What a moving hand may collide with.
 #[derive(Debug)]
 struct Obstacles<'a> {
-    /// The object.
     object: &'a GraspObject,
-    /// Other hands and obstacles.
     barriers: Barriers<'a>,
     /// How many more hand poses may be checked before the motion counts as blocked: bounds the time of hopeless cases.
     poses_left: Cell<u32>,
 }
 
-/// A motion of a hand that starts clear of the object.
 struct Motion<F> {
     /// The hand at a fraction of the motion, from 0 to 1.
     solids_at: F,
@@ -456,7 +450,6 @@ impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
         )
     }
 
-    /// Checks a part.
     fn is_part_free(
         &self,
         obstacles: &Obstacles<'_>,

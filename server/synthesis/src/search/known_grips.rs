@@ -35,7 +35,6 @@ const GRIPS_PER_CLOCK_CHECK: usize = 64;
 /// Known grips in the order in which they are tried.
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
-    /// Hands to try before all others.
     preferred: &'a [HandPose],
     atlas: Option<&'a Atlas>,
     /// All grips of the atlas by falling value, the order of the first pass where there are barriers and any valid grasp ends the
@@ -54,7 +53,6 @@ pub(super) struct KnownGrips<'a> {
     cursor: AtomicUsize,
 }
 
-/// A known grip that may be clear of the barriers.
 struct Candidate<'a> {
     source: GraspSource,
     entry: &'a Entry,
@@ -105,12 +103,10 @@ impl<'a> KnownGrips<'a> {
         self.cursor.load(Ordering::Relaxed)
     }
 
-    /// How often all grips of the atlas are passed.
     fn passes(&self) -> usize {
         self.grading.as_ref().map_or(1, |grading| grading.grades().len())
     }
 
-    /// True if the object's owner prefers a region that is free.
     fn wants_region(&self) -> bool {
         let grading = self.grading.as_ref();
         grading.is_some_and(|grading| grading.preference.wants_region)
@@ -311,7 +307,6 @@ impl Grading<'_> {
         self.preference.wants_region && !suits_owner(&self.regions.values(contacts))
     }
 
-    /// Whether a grip with this forearm has a grade.
     pub(super) fn fit(&self, grade: Grade, forearm: Vec3, entry: &Entry) -> Fit {
         let suits = self.receiver.suits_forearm(forearm);
         if suits < SUITABLE {

@@ -1,8 +1,5 @@
-//! What keeps one hand from holding an object: conditions that every valid grasp meets, and that this holdout cannot.
-//!
-//! Each is necessary under `PHYSICAL` validity, so that nothing possible is called impossible; only the width is what this search
-//! can open a hand to. They are not sufficient: a search that finds nothing although no limit applies may have had too little
-//! time.
+//! What keeps one hand from holding an object: conditions that every valid grasp meets, and that this holdout cannot. They are not
+//! sufficient: a search that finds nothing although no limit applies may have had too little time.
 
 use std::fmt;
 
@@ -31,10 +28,7 @@ use crate::{
         presented::Presented,
         solids::{PreparedHand, link_radii},
     },
-    propose::{
-        prepared::PreparedRig,
-        surface_pairs::{HoldableSurface, SurfacePair, SurfacePairs},
-    },
+    propose::surface_pairs::{HoldableSurface, SurfacePair, SurfacePairs},
     rating::scoring::middle,
 };
 
@@ -96,27 +90,19 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     let holdable = &object.holdable;
     let friction = query.friction_on(&holdout.object);
     let span = rig.span();
-    let of_region = |region: OrientedBox| {
-        let reaches = query
-            .requirements
-            .reach
-            .into_iter()
-            .chain(arms_reach(holdout.stance));
-        [
-            torque_limit(holdout, &region, friction, span),
-            giver_limit(&Presented::of(holdout), &object.surface_pairs, rig),
-            reaches
-                .into_iter()
-                .find_map(|reach| reach_limit(reach, &region, rig)),
-        ]
-    };
-    let [torque, giver, reach] = holdable.region.map_or([None; 3], of_region);
+    let region = holdable.region.as_ref();
+    let reaches = query.requirements.reach.into_iter();
+    let mut reaches = reaches.chain(arms_reach(holdout.stance));
     [
         mass_limit(&holdout.object),
-        torque,
-        width_limit(holdable, friction, opening(rig).min(span)),
-        giver,
-        reach,
+        region.and_then(|region| torque_limit(holdout, region, friction, span)),
+        width_limit(
+            holdable,
+            friction,
+            (PALM_OVER_PADS * rig.oppositions().widest()).min(span),
+        ),
+        region.and_then(|_| giver_limit(&Presented::of(holdout), &object.surface_pairs, rig)),
+        region.and_then(|region| reaches.find_map(|reach| reach_limit(reach, region, rig))),
     ]
     .into_iter()
     .flatten()
@@ -168,7 +154,6 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
     ))
 }
 
-/// All contacts push up as hard as they can.
 fn mass_limit(object: &GraspObject) -> Option<Limit> {
     let bound = HAND_FORCE / (GRAVITY * (1.0 - BALANCE_TOLERANCE));
     Limit::if_exceeded(Check::Mass, object.mass, bound)
@@ -182,11 +167,6 @@ fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f3
     let unbalanced = BALANCE_TOLERANCE * weight * HAND_LENGTHS[1];
     let bound = HAND_FORCE * (lever + friction * TORSION_LEVER) + unbalanced;
     Limit::if_exceeded(Check::Torque, weight * arm, bound)
-}
-
-/// How far apart places may be that a hand presses against each other, in metres.
-fn opening(rig: &PreparedRig) -> f32 {
-    PALM_OVER_PADS * rig.oppositions().widest()
 }
 
 /// Contacts that hold have normals more than a right angle apart, at most an opening from each other.
@@ -257,10 +237,7 @@ fn reach_limit(reach: Reach, region: &OrientedBox, rig: &Rig) -> Option<Limit> {
 
 /// The distance of a box from the vertical line through a point, in metres; 0 if they meet.
 fn horizontal_distance(region: &OrientedBox, point: Vec3, up: Vec3) -> f32 {
-    let OrientedBox {
-        object_from_box,
-        half_extents,
-    } = *region;
+    let (object_from_box, half_extents) = (region.object_from_box, region.half_extents);
     let offset = object_from_box.position - point;
     let half_edges = Vec3::AXES.map(|axis| object_from_box.transform_vector(axis) * half_extents.dot(axis));
     let gap = |direction: Vec3| {

@@ -113,7 +113,6 @@ fn is_preferred_region_free(object: &PreparedObject, barriers: Barriers<'_>) -> 
     !wanted.is_empty() && free.count() as f32 >= FREE_SHARE * compared.len() as f32
 }
 
-/// True if no value is below its least.
 fn reach(values: &Values, least: &[(Term, f32)]) -> bool {
     least.iter().all(|&(term, least)| values[term as usize] >= least)
 }

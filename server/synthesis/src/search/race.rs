@@ -45,13 +45,11 @@ const REGION_ATTEMPTS: u64 = 256;
 /// Marks a worker that is not running an attempt.
 const IDLE: u64 = u64::MAX;
 
-/// The shared state of the workers of one search.
 pub(super) struct Race<'a> {
     scene: &'a Scene<'a>,
     settings: &'a SearchSettings,
     clock: &'a dyn Clock,
     stop: Stop<'a>,
-    /// One past the last attempt.
     end: u64,
     /// The next attempt to start. Indices are taken in order, so all below it are taken.
     next: AtomicU64,
@@ -62,14 +60,12 @@ pub(super) struct Race<'a> {
     settles: AtomicU64,
     /// Set to stop all workers: any grasp will do and one was found, or a worker panicked.
     over: AtomicBool,
-    /// The lowest attempt that was started but interrupted.
     lowest_interrupted: AtomicU64,
     /// The attempt that each worker is running, or a lower index; [`IDLE`] before it starts and after it stops.
     running: Vec<AtomicU64>,
     known: Option<&'a KnownGrips<'a>>,
     /// Set once the best known grip is valid, but not where the object's owner wants hands that have room there.
     is_beside_region: AtomicBool,
-    /// Valid grasps so far.
     candidates: AtomicU64,
     winners: Mutex<Winners>,
     tallies: Mutex<Vec<Tally>>,
@@ -79,7 +75,6 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Stops the other workers if its own worker panics.
 struct PanicGuard<'a>(&'a AtomicBool);
 
 impl Drop for PanicGuard<'_> {
@@ -121,7 +116,6 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Runs attempts until the race is over.
     pub(super) fn run_worker(&self, worker: usize, mut stopwatch: Stopwatch<'_>) {
         let guard = PanicGuard(&self.over);
         let mut tally = Tally::default();
@@ -182,7 +176,6 @@ impl<'a> Race<'a> {
         (index < self.end).then_some(index)
     }
 
-    /// True if an attempt need not run to its end.
     fn is_over_for(&self, index: u64) -> bool {
         self.over.load(Ordering::Relaxed)
             || self.bound.load(Ordering::Relaxed) < index
@@ -190,7 +183,6 @@ impl<'a> Race<'a> {
             || self.end_time().is_some_and(|end| self.clock.now() >= end)
     }
 
-    /// When the search ends by its clock.
     fn end_time(&self) -> Option<Duration> {
         let settled = self.settles.load(Ordering::Relaxed);
         let settled = (settled != u64::MAX).then(|| Duration::from_nanos(settled));
@@ -251,7 +243,6 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Records a valid grasp.
     fn record_valid(&self, source: GraspSource, grasp: Box<Grasp>, value: f32, is_chosen: bool) {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let goes_on = self.show(source, &grasp, value);
@@ -372,7 +363,6 @@ impl<'a> Race<'a> {
         Some(before.min(self.bound.load(Ordering::SeqCst)))
     }
 
-    /// The outcome, after all workers have stopped.
     pub(super) fn outcome(self) -> SearchOutcome {
         let interrupted = self.lowest_interrupted.into_inner();
         let is_reproducible = self.settings.run.reproducible;
@@ -430,7 +420,6 @@ impl<'a> Race<'a> {
     }
 }
 
-/// A valid grasp.
 struct Winner {
     source: GraspSource,
     grasp: Box<Grasp>,
@@ -444,7 +433,6 @@ struct Winner {
 struct Winners {
     /// The best, the first, or the one with the lowest index that a person would choose.
     chosen: Option<Winner>,
-    /// Those that a person would not choose.
     others: Vec<Winner>,
 }
 

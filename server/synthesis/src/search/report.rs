@@ -191,9 +191,7 @@ const SETTLE_INTERVAL: usize = 4096;
 /// A completed attempt.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Record {
-    /// Its index.
     pub(super) attempt: u64,
-    /// Number of placements it pruned.
     pub(super) pruned: u64,
     /// Why it failed; `None` if it was valid.
     pub(super) rejection: Option<Rejection>,
@@ -203,9 +201,7 @@ pub(super) struct Record {
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     pub(super) report: SearchReport,
-    /// Attempts that count only if no earlier attempt is valid.
     unsettled: Vec<Record>,
-    /// Placements pruned by an interrupted attempt.
     pub(super) interrupted_prunes: u64,
 }
 
@@ -220,7 +216,6 @@ impl Tally {
         }
     }
 
-    /// Counts the kept attempts up to index `last`.
     fn settle(&mut self, last: u64) {
         // A worker's indices ascend.
         let settled = self.unsettled.partition_point(|record| record.attempt <= last);
@@ -303,7 +298,6 @@ fn part_of(contacts: &[Contact], object: &GraspObject) -> Part {
 #[derive(Clone, Debug)]
 pub struct Alternatives {
     most: usize,
-    /// The best of each class, best first.
     best: Vec<Alternative>,
 }
 

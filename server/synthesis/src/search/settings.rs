@@ -93,7 +93,6 @@ impl Query {
         self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
     }
 
-    /// The context in which hands are assessed.
     pub(super) fn around<'a>(
         &'a self,
         holdout: &'a Holdout,

@@ -83,9 +83,7 @@ impl HeldPart {
             all_around: evenness(&part.facing, x, y) * evenness(&part.spread, x, y),
         }
     }
-}
 
-impl HeldPart {
     /// Its diameter, in hand lengths, if it is as thick as wide: exact within 3 % for round and square rods.
     pub(super) fn diameter(&self) -> f32 {
         DIAMETER_PER_THICKNESS * self.thickness
@@ -197,41 +195,27 @@ const OTHER_SHAPE: f32 = 0.6;
 /// How well what is held fits, 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShapeFits {
-    /// A ball, or what feels like one to fingertips.
     pub(super) ball: f32,
-    /// A ball for a whole hand.
     pub(super) ball_in_fist: f32,
     /// A disk, or the end of a cylinder, that the palm faces and the digits hold by its rim.
     pub(super) disk: f32,
     /// Something straight across the fingers: neither ball nor disk.
     pub(super) prismatic: f32,
-    /// Something round or at least compact.
     pub(super) compact: f32,
     /// Something that a hand wraps around: neither ball nor disk, and not flat.
     pub(super) bar: f32,
-    /// A plate, whatever it is held by.
     pub(super) plate: f32,
     /// Something flat that stretched fingers lie along; in part, any prism.
     pub(super) flat: f32,
-    /// A thin rod.
     pub(super) pen: f32,
-    /// A rod that fingers can steady.
     pub(super) stick: f32,
-    /// Something that thumb and index finger close around.
     pub(super) ring: f32,
-    /// Something as thin as the loops of scissors.
     pub(super) loops: f32,
-    /// Narrow enough for thumb and index finger.
     pub(super) pinchable: f32,
-    /// Narrow enough for the side of a finger, and no ball.
     pub(super) between_sides: f32,
-    /// Thin enough for the tip of an adducted thumb to lie on it.
     pub(super) light: f32,
-    /// Of small diameter.
     pub(super) small: f32,
-    /// Of medium diameter.
     pub(super) medium: f32,
-    /// Of large diameter.
     pub(super) large: f32,
 }
 

@@ -145,7 +145,6 @@ pub(super) fn nearness(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp)
     1.0 + (1.0 + way_of(scene, current, grasp)).recip()
 }
 
-/// True if a search need not look for a nearer grasp.
 pub(super) fn is_at_hand(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> bool {
     way_of(scene, current, grasp) <= AT_HAND
 }
