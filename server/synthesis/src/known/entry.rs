@@ -75,7 +75,9 @@ impl Entry {
                     force_values(scene, contacts, &balance.forces),
                     upright_values(scene.object, grip.pose.frame_from_wrist, direction(index)),
                 );
-                quantized(of_grip + mean_value(&values))
+                // 0 to 1 as a number from 1 to 255.
+                let score = (of_grip + mean_value(&values)).clamp(0.0, 1.0);
+                (1.0 + score * 254.0).round() as u8
             })
         });
         let finger_subsets = FingerSubsets::of(grip.holding_digits(), |kept| {
@@ -219,11 +221,6 @@ impl Entry {
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + size_of_val(self.contacts.as_slice())
     }
-}
-
-/// A score in 0 … 1 as a number from 1 to 255.
-fn quantized(score: f32) -> u8 {
-    (1.0 + score.clamp(0.0, 1.0) * 254.0).round() as u8
 }
 
 /// Number of directions that gravity is quantized to, about 18° apart. More order the grips more exactly, and cost 2 bytes and

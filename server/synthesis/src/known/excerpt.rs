@@ -62,7 +62,12 @@ struct Direction {
 
 impl Direction {
     fn new(values: Vec<Row>, chunks: &Chunks, clear_of: &[ClearOf]) -> Self {
-        let least = least_served(&values, chunks, clear_of);
+        let mut best = [SLIPS; PLACES];
+        for (row, clear_of) in values.iter().zip(clear_of) {
+            serve(&mut best, row, chunks, clear_of);
+        }
+        // What is so far below the best clear grip does not count.
+        let least = best.map(|best| best.saturating_sub(VALUE_MARGIN));
         Self {
             values,
             least,
@@ -249,15 +254,6 @@ fn values(entries: &[Entry], up: usize) -> Vec<Row> {
         })
     };
     entries.iter().map(row).collect()
-}
-
-/// What each giver counts as served with before any grip is listed: the value that does not count next to its best clear grip.
-fn least_served(values: &[Row], chunks: &Chunks, clear_of: &[ClearOf]) -> Served {
-    let mut served = [SLIPS; PLACES];
-    for (row, clear_of) in values.iter().zip(clear_of) {
-        serve(&mut served, row, chunks, clear_of);
-    }
-    served.map(|best| best.saturating_sub(VALUE_MARGIN))
 }
 
 /// Serves the givers that are clear of a grip, if it is better than what they have.

@@ -14,7 +14,7 @@ use super::{
     entry::Entry,
     excerpt::{Wanted, excerpt, times_listed},
     seeds::Seeds,
-    spread::{Admission, Cell, Occupancy, Spread, base_score},
+    spread::{Admission, Cell, Occupancy, Spread},
 };
 use crate::{
     base::{
@@ -378,9 +378,9 @@ impl<'a> Growth<'a> {
     /// Admits a grip if its cell has room for it or if it is required.
     fn admit(&mut self, entry: Entry, shape: HandShape, is_required: bool) {
         let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-        match self.spread.admission(cell, base_score(&entry)) {
+        match self.spread.admission(cell, grip_total(&entry.grip_values)) {
             Admission::Replace(index) if !is_required => {
-                self.spread.record(cell, index, base_score(&entry));
+                self.spread.record(cell, index, grip_total(&entry.grip_values));
                 self.grips.replace(self.rig, index, entry);
                 self.shapes[index] = shape;
             }
@@ -392,7 +392,8 @@ impl<'a> Growth<'a> {
 
     fn push(&mut self, entry: Entry, shape: HandShape) {
         let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-        self.spread.record(cell, self.len(), base_score(&entry));
+        self.spread
+            .record(cell, self.len(), grip_total(&entry.grip_values));
         self.grips.push(self.rig, entry);
         self.shapes.push(shape);
     }

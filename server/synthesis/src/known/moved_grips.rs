@@ -42,15 +42,14 @@ const STRIDE_ALONG_FINGERS: usize = 4;
 pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, pose: &HandPose) -> HandPose {
     let alone = Presented::alone(Vec3::Y);
     let mut gripper = Gripper::default();
-    let held = [PosedDigits::Settled, PosedDigits::Still].into_iter();
-    let mut held = held.filter_map(|digits| gripper.hold_posed(own, rig, pose, &alone, digits).ok());
-    let Some((grip, _)) = held.next() else {
+    let mut hold = |digits| gripper.hold_posed(own, rig, pose, &alone, digits).ok();
+    let held = hold(PosedDigits::Settled).or_else(|| hold(PosedDigits::Still));
+    let Some((grip, _)) = held else {
         return HandPose {
             frame_from_wrist: own.object.wrist_at(scale, pose.frame_from_wrist),
             ..*pose
         };
     };
-    drop(held);
     let way = way_with_contacts(&gripper.contacts, scale);
     let following = HandPose {
         frame_from_wrist: way * grip.pose.frame_from_wrist,

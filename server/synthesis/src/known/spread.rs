@@ -11,7 +11,6 @@ use crate::{
         grasp::Contact,
         hand::{Digit, HandPart, HandPose, rig::Rig},
         object::GraspObject,
-        score::grip_total,
     },
     physical::{grip::GIVER_CLEARANCE, solids::TaperedCapsule},
 };
@@ -88,11 +87,6 @@ impl Spread {
             None => alike.push((index, base_score)),
         }
     }
-}
-
-/// The part of an entry's score that depends on neither gravity nor giver.
-pub(super) fn base_score(entry: &Entry) -> f32 {
-    grip_total(&entry.grip_values)
 }
 
 /// Edge of a cell in metres. Smaller cells separate hands better; memory grows with the third power.

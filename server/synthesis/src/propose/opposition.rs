@@ -133,7 +133,7 @@ fn min_facing_cos(width: f32) -> f32 {
 /// The sampled oppositions of a rig.
 #[derive(Clone, Debug, Default)]
 pub struct Oppositions {
-    by_width: Vec<Opposition>,
+    pub(super) by_width: Vec<Opposition>,
     /// Their widths in metres, contiguous for binary search.
     widths: Vec<f32>,
     /// Inner spheres of palm and forearm, in the wrist's frame.
@@ -177,11 +177,6 @@ impl Oppositions {
     /// The largest distance between opposed pads, in metres; 0 if the rig has no oppositions.
     pub fn widest(&self) -> f32 {
         self.widths.last().copied().unwrap_or_default()
-    }
-
-    /// The opposition with an index.
-    pub fn get(&self, index: u16) -> &Opposition {
-        &self.by_width[usize::from(index)]
     }
 }
 

@@ -157,7 +157,7 @@ impl PreparedObject {
     pub fn placement_cache(&self, rig: &PreparedRig) -> Arc<PlacementCache> {
         // Built outside the lock, so that searches with other hands are not blocked.
         let slot = self.cache_slot(rig);
-        Arc::clone(slot.get_or_init(|| Arc::new(PlacementCache::of(self, rig))))
+        Arc::clone(slot.get_or_init(|| Arc::new(unstopped(|stop| PlacementCache::of_until(self, rig, stop)))))
     }
 
     /// Builds what [`Self::placement_cache`] returns, unless it is stopped. Meanwhile, others may build it, too.
@@ -316,11 +316,7 @@ impl PlacementCache {
     /// Upper bound on the size of one cache, in bytes.
     pub const MAX_BYTES: usize = ROWS as usize * KEPT * size_of::<CachedPlacement>();
 
-    /// Samples the placements: about five milliseconds. `None` for a crowded surface.
-    pub fn of(object: &PreparedObject, rig: &PreparedRig) -> Self {
-        unstopped(|stop| Self::of_until(object, rig, stop))
-    }
-
+    /// Samples the placements: about five milliseconds. None on a crowded surface.
     fn of_until(object: &PreparedObject, rig: &PreparedRig, stop: Stop<'_>) -> Result<Self, Stopped> {
         let context = ProposalContext {
             object,
@@ -353,7 +349,7 @@ impl PlacementCache {
     pub fn row<'a>(&'a self, attempt: u64, rig: &'a PreparedRig) -> impl Iterator<Item = Candidate<'a>> {
         let row = usize::try_from(attempt).ok().and_then(|row| self.rows.get(row));
         row.into_iter().flatten().map(|placement| Candidate {
-            opposition: rig.oppositions().get(placement.opposition),
+            opposition: &rig.oppositions().by_width[usize::from(placement.opposition)],
             pair: placement.pair,
             object_from_wrist: placement.object_from_wrist(),
         })

@@ -144,11 +144,10 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
             return evaluation;
         }
         // One that does not hold the object at all is no grip.
-        let held = [PosedDigits::Settled, PosedDigits::Still].into_iter();
-        let held =
-            held.filter_map(|digits| gripper.hold_posed(&around.object, rig, pose, &alone, digits).ok());
+        let mut hold = |digits| gripper.hold_posed(&around.object, rig, pose, &alone, digits).ok();
+        let held = hold(PosedDigits::Settled).or_else(|| hold(PosedDigits::Still));
         // What hangs is no grip for other directions of gravity.
-        if let Some((grip, solids)) = { held }.next()
+        if let Some((grip, solids)) = held
             && gripper.hang.is_none()
         {
             let entry = Entry::of_held(&around.object, rig, grip, &solids, &gripper);
