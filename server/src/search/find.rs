@@ -276,7 +276,7 @@ impl Stream {
     pub(crate) fn take(&self) -> Vec<Found> {
         let mut state = self.finds.state();
         let alternatives = std::mem::replace(&mut state.alternatives, Alternatives::new(0));
-        let alternatives = alternatives.into_best().into_iter().map(|best| Found {
+        let alternatives = alternatives.best.into_iter().map(|best| Found {
             handedness: best.handedness,
             grasp: best.found,
         });

@@ -105,12 +105,6 @@ struct Giver {
     seeds: Option<Seeds>,
 }
 
-impl Giver {
-    fn needs_grips(&self) -> bool {
-        self.seeds.is_some()
-    }
-}
-
 /// An atlas being grown.
 #[derive(Debug)]
 pub struct Growth<'a> {
@@ -256,7 +250,7 @@ impl<'a> Growth<'a> {
             .map(|index| self.try_proposal(index, giver.as_ref(), gripper))
             .collect();
         self.proposed += ROUND;
-        let needs_grips = giver.as_ref().is_some_and(Giver::needs_grips);
+        let needs_grips = giver.as_ref().is_some_and(|giver| giver.seeds.is_some());
         for (entry, shape) in found.into_iter().flatten() {
             self.admit(entry, shape, needs_grips);
         }
@@ -308,7 +302,7 @@ impl<'a> Growth<'a> {
             )
             .ok()?;
         // Evaluating the entry takes longest: drop it first if its cell is full.
-        let needs_grips = giver.is_some_and(Giver::needs_grips);
+        let needs_grips = giver.is_some_and(|giver| giver.seeds.is_some());
         let contacts = &gripper.contacts;
         let classification = classify(self.rig, &grip.pose, contacts, &self.scene.object.local_shape);
         let values = grip_values(

@@ -242,19 +242,13 @@ fn clearance(
 
 /// A hand's solids without the fingers that do not hold, which rest elsewhere.
 fn solids_of(kept: [bool; 5], solids: &HandSolids) -> impl Iterator<Item = &TaperedCapsule> + Clone {
-    let HandSolids {
-        phalanges,
-        palm,
-        thenar,
-        forearm,
-    } = solids;
-    let digits = phalanges.iter().zip(kept);
+    let digits = solids.phalanges.iter().zip(kept);
     digits
         .filter_map(|(links, holds)| holds.then_some(links))
         .flatten()
-        .chain(palm)
-        .chain(thenar)
-        .chain(forearm)
+        .chain(&solids.palm)
+        .chain(&solids.thenar)
+        .chain(&solids.forearm)
 }
 
 /// Where seeds come from.

@@ -286,15 +286,12 @@ struct CachedPlacement {
 
 impl CachedPlacement {
     fn of(candidate: &Candidate<'_>) -> Self {
-        let Pose {
-            position,
-            orientation,
-        } = candidate.object_from_wrist;
+        let wrist = candidate.object_from_wrist;
         Self {
             opposition: candidate.opposition.index,
             pair: candidate.pair,
-            position,
-            orientation: orientation.to_array(),
+            position: wrist.position,
+            orientation: wrist.orientation.to_array(),
         }
     }
 

@@ -67,33 +67,19 @@ fn next<const N: usize>(numbers: &mut impl Iterator<Item = f32>) -> [f32; N] {
 }
 
 impl Network {
-    /// Standardizes the inputs: standard deviations from the mean, clamped to ±[`MAX_DEVIATION`].
-    pub fn scaled(&self, inputs: &[f32; INPUTS]) -> [f32; INPUTS] {
-        std::array::from_fn(|i| {
-            ((inputs[i] - self.means[i]) * self.scales[i]).clamp(-MAX_DEVIATION, MAX_DEVIATION)
-        })
-    }
-
-    /// Activations of the hidden units for standardized inputs.
-    pub fn units(&self, scaled: &[f32; INPUTS]) -> [f32; UNITS] {
-        let mut units = self.biases;
-        // Indexed, because the compiler does not inline zipped and mapped arrays here.
-        for (inputs, weights) in scaled.iter().zip(&self.weights) {
-            for k in 0..UNITS {
-                units[k] += inputs * weights[k];
-            }
-        }
-        for unit in &mut units {
-            *unit = unit.max(0.0);
-        }
-        units
-    }
-
     /// Log odds that the hand holds.
     pub fn log_odds(&self, inputs: &[f32; INPUTS]) -> f32 {
-        let units = self.units(&self.scaled(inputs));
+        let mut units = self.biases;
+        for (i, weights) in self.weights.iter().enumerate() {
+            let deviation = (inputs[i] - self.means[i]) * self.scales[i];
+            let scaled = deviation.clamp(-MAX_DEVIATION, MAX_DEVIATION);
+            // Indexed, because the compiler does not inline zipped and mapped arrays here.
+            for k in 0..UNITS {
+                units[k] += scaled * weights[k];
+            }
+        }
         let weighted = units.iter().zip(&self.outputs);
-        self.output_bias + weighted.map(|(unit, weight)| unit * weight).sum::<f32>()
+        self.output_bias + weighted.map(|(unit, weight)| unit.max(0.0) * weight).sum::<f32>()
     }
 }
 

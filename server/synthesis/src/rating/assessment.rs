@@ -144,12 +144,11 @@ impl GraspContext<'_> {
         hangs: bool,
     ) -> Result<Classification, Rejection> {
         let classification = self.classification(&grip.pose, contacts, hangs);
-        if !self.requirements.admits_contacts(contacts)
-            || !self.requirements.admits_type(classification.grasp_type)
-        {
-            return Err(Rejection::UnmetRequirement);
-        }
-        Ok(classification)
+        let is_admitted = self.requirements.admits_contacts(contacts)
+            && self.requirements.admits_type(classification.grasp_type);
+        is_admitted
+            .then_some(classification)
+            .ok_or(Rejection::UnmetRequirement)
     }
 
     pub(super) fn clearances(

@@ -49,7 +49,8 @@ struct Course<'a, 'b> {
 /// The state of an attempt. Reuse it for the next attempt to keep its buffers.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    pruned_placements: u64,
+    /// How many placements the pruning measures discarded before accepting one.
+    pub pruned_placements: u64,
     wrist: WristFrame,
     /// The digits posed by this attempt, thumb first.
     posed: Vec<DigitAngles>,
@@ -74,11 +75,6 @@ impl Default for Attempt {
 }
 
 impl Attempt {
-    /// How many placements the pruning measures discarded before accepting one.
-    pub fn pruned_placements(&self) -> u64 {
-        self.pruned_placements
-    }
-
     /// Where the attempt placed the wrist.
     pub fn wrist(&self) -> &WristFrame {
         &self.wrist
@@ -258,11 +254,9 @@ impl Attempt {
 }
 
 fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure> {
-    if scene.admits_wrist(wrist.object_from_wrist) {
-        Ok(*wrist)
-    } else {
-        Err(Rejection::UnmetRequirement.into())
-    }
+    let is_admitted = scene.admits_wrist(wrist.object_from_wrist);
+    let admitted = is_admitted.then_some(*wrist);
+    admitted.ok_or_else(|| Rejection::UnmetRequirement.into())
 }
 
 /// Consecutive perturbations without improvement after which a near miss is given up.

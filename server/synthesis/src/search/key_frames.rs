@@ -118,14 +118,9 @@ pub fn key_frames(
 }
 
 fn moved(pose: &HandPose, displacement: Vec3) -> HandPose {
-    let Pose {
-        position,
-        orientation,
-    } = pose.frame_from_wrist;
-    HandPose {
-        frame_from_wrist: Pose::new(position + displacement, orientation),
-        digits: pose.digits,
-    }
+    let mut moved = *pose;
+    moved.frame_from_wrist.position += displacement;
+    moved
 }
 
 struct Planner<'a> {

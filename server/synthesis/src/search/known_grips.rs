@@ -63,9 +63,7 @@ impl<'a> KnownGrips<'a> {
     /// The known grips that a search may use; `None` if there are none.
     pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
         let around = scene.surroundings()?;
-        let GraspContext {
-            object, presented, ..
-        } = around;
+        let (object, presented) = (around.object, around.presented);
         let atlas = settings.known.atlas.as_deref();
         let preferred = &*settings.known.preferred;
         let learned = settings.learned();

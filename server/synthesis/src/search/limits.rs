@@ -69,14 +69,12 @@ pub struct Limit {
 }
 
 impl Limit {
-    fn unbounded(check: Check, value: f32) -> Self {
-        let bound = None;
+    fn new(check: Check, value: f32, bound: Option<f32>) -> Self {
         Self { check, value, bound }
     }
 
     fn if_exceeded(check: Check, value: f32, bound: f32) -> Option<Self> {
-        let bound = Some(bound);
-        (Some(value) > bound).then_some(Self { check, value, bound })
+        (value > bound).then_some(Self::new(check, value, Some(bound)))
     }
 }
 
@@ -135,7 +133,7 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
     };
     let share = blocked as f32 / all as f32;
     if share > MOST {
-        return Some(Limit::unbounded(Check::ObstacleClearance, share));
+        return Some(Limit::new(Check::ObstacleClearance, share, None));
     }
     let holds_none = atlas.is_some_and(|atlas| atlas.holding_under(presented.up).is_empty());
     if !holds_none || entries.is_empty() {
@@ -148,10 +146,8 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
             .length()
     };
     let least = entries.iter().map(arm).fold(f32::INFINITY, f32::min);
-    Some(Limit::unbounded(
-        Check::Torque,
-        holdout.object.mass * GRAVITY * least,
-    ))
+    let torque = holdout.object.mass * GRAVITY * least;
+    Some(Limit::new(Check::Torque, torque, None))
 }
 
 fn mass_limit(object: &GraspObject) -> Option<Limit> {
@@ -171,18 +167,17 @@ fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f3
 
 /// Contacts that hold have normals more than a right angle apart, at most an opening from each other.
 fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Option<Limit> {
-    let forbidden = Limit::unbounded(Check::Forbidden, holdable.forbidden_share);
+    let forbidden = Limit::new(Check::Forbidden, holdable.forbidden_share, None);
     if holdable.region.is_none() {
         return Some(forbidden);
     }
     let is_wide =
         |width: Option<f32>| width.filter(|&width| width > opening && friction <= MAX_FRICTION_OF_WIDTH);
     is_wide(holdable.width)?;
-    Some(is_wide(holdable.width_of_all).map_or(forbidden, |width| Limit {
-        check: Check::Width,
-        value: width,
-        bound: Some(opening),
-    }))
+    Some(
+        is_wide(holdable.width_of_all)
+            .map_or(forbidden, |width| Limit::new(Check::Width, width, Some(opening))),
+    )
 }
 
 /// The thinnest finger fits nowhere between the object and the giver.
@@ -206,11 +201,7 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
             return None;
         }
     }
-    (!surface.points.is_empty()).then_some(Limit {
-        check: Check::GiverClearance,
-        value: room,
-        bound: Some(needed),
-    })
+    (!surface.points.is_empty()).then_some(Limit::new(Check::GiverClearance, room, Some(needed)))
 }
 
 /// The range of a given arm: no wrist is farther from the shoulder than the stretched bones.

@@ -125,7 +125,7 @@ impl<'a> Race<'a> {
             let mut stream = AttemptStream::new(self.settings.run.seed, index);
             let is_over = || self.is_over_for(index);
             let ended = attempt.run(self.scene, &mut stream, &mut stopwatch, Stop::when(&is_over));
-            let pruned = attempt.pruned_placements();
+            let pruned = attempt.pruned_placements;
             let rejection = match ended {
                 Err(Failure::Stopped) => {
                     self.lowest_interrupted.fetch_min(index, Ordering::SeqCst);
@@ -369,9 +369,12 @@ impl<'a> Race<'a> {
         let winners = self.winners.into_inner().unwrap_or_else(PoisonError::into_inner);
         let (winner, replaceable_until) = winners.decided(is_reproducible);
         let settles = Duration::from_nanos(self.settles.into_inner());
-        let replaceable_until = replaceable_until.map(|last| match is_reproducible {
-            true => Replaceable::UntilAttempt(last),
-            false => Replaceable::UntilTime(settles),
+        let replaceable_until = replaceable_until.map(|last| {
+            if is_reproducible {
+                Replaceable::UntilAttempt(last)
+            } else {
+                Replaceable::UntilTime(settles)
+            }
         });
         // Reproducible: an interrupted attempt with a lower index, or one that replaces the winner, might have won.
         let last_deciding = match replaceable_until {

@@ -298,7 +298,8 @@ fn part_of(contacts: &[Contact], object: &GraspObject) -> Part {
 #[derive(Clone, Debug)]
 pub struct Alternatives {
     most: usize,
-    best: Vec<Alternative>,
+    /// The best of each class, best first.
+    pub best: Vec<Alternative>,
 }
 
 /// The best grasp of its class.
@@ -353,11 +354,6 @@ impl Alternatives {
         self.best.insert(place, new);
         self.best.truncate(self.most);
     }
-
-    /// The grasps, best first.
-    pub fn into_best(self) -> Vec<Alternative> {
-        self.best
-    }
 }
 
 #[cfg(test)]
@@ -390,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn merge_adds_counts_and_keeps_the_nearest_miss() {
+    fn merge_adds_counts_and_keeps_the_nearest_miss_and_the_better_source() {
         let mut total = SearchReport::default();
         for nearest_miss in [
             Some(miss(Rejection::NotImmobilizing, Some(0.4), 3)),
@@ -410,18 +406,13 @@ mod tests {
             ..SearchReport::default()
         };
         assert_eq!(total, expected);
-    }
-
-    #[test]
-    fn merge_takes_the_source_of_the_better_grasp() {
-        let of_attempt = |attempt| SearchReport {
-            source: Some(GraspSource::Attempt(attempt)),
+        let mut better = SearchReport {
+            source: Some(GraspSource::Current),
             ..SearchReport::default()
         };
-        let mut total = of_attempt(1);
-        total.merge(of_attempt(2), false);
-        assert_eq!(total, of_attempt(1));
-        total.merge(of_attempt(3), true);
-        assert_eq!(total, of_attempt(3));
+        better.merge(total.clone(), false);
+        assert_eq!(better.source, Some(GraspSource::Current));
+        total.merge(better, true);
+        assert_eq!(total.source, Some(GraspSource::Current));
     }
 }

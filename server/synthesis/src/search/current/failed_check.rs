@@ -154,19 +154,12 @@ fn holding(held: &Held<'_>, requirements: &Requirements) -> Result<Classificatio
 }
 
 fn kept(check: Check, measure: Measure) -> Result<(), FailedCheck> {
-    if measure.passed {
-        Ok(())
-    } else {
-        Err(FailedCheck::by(check, measure))
-    }
+    let passed = measure.passed.then_some(());
+    passed.ok_or_else(|| FailedCheck::by(check, measure))
 }
 
 fn holds(check: Check, passed: bool) -> Result<(), FailedCheck> {
-    if passed {
-        Ok(())
-    } else {
-        Err(FailedCheck::new(check))
-    }
+    passed.then_some(()).ok_or_else(|| FailedCheck::new(check))
 }
 
 /// The first `count` preferred hands of the settings that are not valid, by their places, and why: the first check that each

@@ -90,14 +90,14 @@ impl<'a> Replanner<'a> {
         if let Some(preferred) = self.preferred(gripper, stop)? {
             return Ok(Some(preferred));
         }
-        let sources: [(_, fn(u16) -> GraspSource); 2] = [
-            (self.atlas, GraspSource::Atlas),
-            (self.learned, GraspSource::Learned),
-        ];
-        for (atlas, source) in sources {
-            if let Some(atlas) = atlas
-                && let Some(known) = self.nearest_of(atlas.grips(), source, gripper, stop)?
-            {
+        let of_atlas = self
+            .atlas
+            .map(|atlas| (atlas, GraspSource::Atlas as fn(u16) -> _));
+        let of_learned = self
+            .learned
+            .map(|learned| (learned, GraspSource::Learned as fn(u16) -> _));
+        for (atlas, source) in of_atlas.into_iter().chain(of_learned) {
+            if let Some(known) = self.nearest_of(atlas.grips(), source, gripper, stop)? {
                 return Ok(Some(known));
             }
         }

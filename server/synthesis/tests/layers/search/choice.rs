@@ -149,12 +149,12 @@ fn the_best_of_the_best_classes_remain_in_whatever_order_they_come() {
                     let skipped = alternative.found.value < least && !alternative.found.source.is_preferred();
                     let mut with = kept.clone();
                     with.offer(alternative.clone());
-                    let (with, without) = (sources(&with.into_best()), sources(&kept.clone().into_best()));
+                    let (with, without) = (sources(&with.best), sources(&kept.clone().best));
                     assert!(!skipped || with == without);
                 }
                 kept.offer(alternative.clone());
             }
-            assert_eq!(sources(&kept.into_best()), sources(&best), "round {round}");
+            assert_eq!(sources(&kept.best), sources(&best), "round {round}");
         }
     }
 }
