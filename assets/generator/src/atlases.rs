@@ -180,13 +180,13 @@ fn grow(object: &PreparedObject, rig: &PreparedRig, bar: &ProgressBar) -> Grown 
 /// Compares an excerpt with what would be made now.
 fn compare(bytes: &[u8], object: &PreparedObject, rig: &PreparedRig) -> Result<(), Difference> {
     let shipped = decode(bytes, object, rig)?;
-    if shipped.atlas.is_complete() || shipped.proposed() > 0 || shipped.atlas.entries().is_empty() {
+    if shipped.atlas.is_complete() || shipped.proposed > 0 || shipped.atlas.entries().is_empty() {
         return Err(Difference::NotAnExcerpt);
     }
     if bytes.len() > MAX_BYTES {
         return Err(Difference::TooLarge(bytes.len()));
     }
-    if shipped.early_stamp() != early_stamp(object, rig) {
+    if shipped.early_stamp != early_stamp(object, rig) {
         return Err(Difference::OtherGrips);
     }
     match first_difference(&shipped.atlas, object, rig) {
@@ -214,7 +214,7 @@ fn early_stamp(object: &PreparedObject, rig: &PreparedRig) -> u64 {
     while growth.proposed() < EARLY_PROPOSALS {
         growth.round(&mut gripper);
     }
-    growth.grown().early_stamp()
+    growth.grown().early_stamp
 }
 
 #[cfg(test)]

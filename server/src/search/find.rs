@@ -250,7 +250,7 @@ impl Stream {
     pub(crate) fn take(&self) -> Vec<Found> {
         let waiting = locked(&self.finds.waiting).take();
         let alternatives = std::mem::replace(&mut *locked(&self.finds.alternatives), Alternatives::new(0));
-        let alternatives = alternatives.into_best().into_iter().map(|best| Found {
+        let alternatives = alternatives.best.into_iter().map(|best| Found {
             handedness: best.handedness,
             grasp: best.found,
         });

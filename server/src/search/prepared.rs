@@ -14,7 +14,7 @@ use grasp_synthesis::{
     known::entry::Entry,
     model::{grasp::Grasp, holdout::Holdout, strategy::Validity},
     search::{
-        GraspSource, LookUp, SearchEnd, SearchOutcome,
+        GraspSource, SearchEnd, SearchOutcome,
         current::{
             CurrentGraspStatus, CurrentGraspVerdict, FailedCheck, Settlement, no_grasp_reason, passed_over,
             settle,
@@ -22,8 +22,7 @@ use grasp_synthesis::{
         find_known_grasp,
         key_frames::plan_key_frames,
         limits::{Limit, known_limit, limits},
-        prepare,
-        scene::Task,
+        scene::{Scene, Task},
         settings::SearchSettings,
     },
 };
@@ -115,16 +114,13 @@ impl PreparedJob {
             let within = until.saturating_sub(self.now()) / hands_left;
             let HandSearch { settings, .. } = &self.hands[place];
             match find_known_grasp(self.task(place), settings, &self.find, within) {
-                LookUp::Found(outcome) => {
+                Ok(outcome) => {
                     let is_better = |best: &Ended| rank(&outcome) > rank(&best.outcome);
                     if best.as_ref().is_none_or(is_better) {
-                        best = Some(Ended {
-                            hand: place,
-                            outcome: *outcome,
-                        });
+                        best = Some(Ended { hand: place, outcome });
                     }
                 }
-                LookUp::NotFound { tried } => self.hands[place].settings.known.tried = tried,
+                Err(tried) => self.hands[place].settings.known.tried = tried,
             }
         }
         best.map(|best| self.answer(best, None))
@@ -275,7 +271,7 @@ impl PreparedJob {
     /// `stop` says so first.
     fn settle(&self, place: HandPlace, stop: Stop<'_>) -> Option<(Ended, CurrentGraspVerdict)> {
         let settings = &self.hands[place].settings;
-        match settle(&prepare(self.task(place), settings), settings, stop)? {
+        match settle(&Scene::new(self.task(place), settings), settings, stop)? {
             Settlement::Settled(settled) => {
                 let (outcome, verdict) = *settled;
                 Some((Ended { hand: place, outcome }, verdict))
@@ -297,7 +293,7 @@ impl PreparedJob {
     fn verdict_after(&self, hand: HandPlace, outcome: &SearchOutcome) -> Option<CurrentGraspVerdict> {
         let place = self.current_place()?;
         let settings = &self.hands[place].settings;
-        let scene = prepare(self.task(place), settings);
+        let scene = Scene::new(self.task(place), settings);
         let failed = self.failed.get().copied();
         let mut verdict = CurrentGraspVerdict::after_search(&scene, failed, outcome, hand == place);
         if verdict.status == CurrentGraspStatus::None {

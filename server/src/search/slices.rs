@@ -13,7 +13,7 @@ use grasp_synthesis::{
     base::{clock::Clock, stop::Stop},
     model::{grasp::Grasp, strategy::Choice},
     search::{
-        GraspSource, Replaceable, SearchEnd, SearchOutcome, SearchReport, find_grasp_in, prepare,
+        GraspSource, Replaceable, SearchEnd, SearchOutcome, SearchReport, find_grasp,
         scene::{Scene, Task},
         settings::SearchSettings,
     },
@@ -221,7 +221,7 @@ impl<'a> Slices<'a> {
             site,
             hand,
             settings,
-            scene: prepare(task, settings),
+            scene: Scene::new(task, settings),
             next: settings.clone(),
             left: settings.run.max_attempts,
             per_worker: FIRST_ATTEMPTS_PER_WORKER,
@@ -244,7 +244,7 @@ impl<'a> Slices<'a> {
     pub(super) fn run(&mut self, attempts: u64) -> SearchOutcome {
         let site = self.site;
         self.next.run.max_attempts = self.left.min(attempts);
-        let outcome = find_grasp_in(site.pool, &self.scene, &self.next, site.clock, site.stop);
+        let outcome = find_grasp(site.pool, &self.scene, &self.next, site.clock, site.stop);
         self.next.known.atlas = None;
         self.next.known.learned = None;
         self.next.known.preferred = Arc::default();

@@ -11,7 +11,7 @@ use grasp_synthesis::{
     search::{
         current::{HandWay, nearest_grasp},
         evaluation::{self, Evaluation, HINDRANCES, SIDES},
-        prepare,
+        scene::Scene,
         verdicts::{self, Against, Verdict},
     },
 };
@@ -61,7 +61,7 @@ pub(crate) fn judge(
     let ended = Instant::now();
     let way = nearest
         .as_ref()
-        .map(|nearest| HandWay::between(&prepare(task, settings), &pose, &nearest.pose));
+        .map(|nearest| HandWay::between(&Scene::new(task, settings), &pose, &nearest.pose));
     for verdict in &mut judgement.verdicts {
         name_obstacle(verdict, &prepared.query.obstacle_places);
     }

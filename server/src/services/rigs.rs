@@ -20,7 +20,7 @@ use grasp_synthesis::{
     propose::prepared::{PreparedObject, PreparedRig},
     search::{
         find_grasp,
-        scene::Task,
+        scene::{Scene, Task},
         settings::{Run, SearchSettings},
     },
 };
@@ -441,7 +441,13 @@ fn taken_boxes(rig: &PreparedRig, size: f32) -> (usize, Rejection) {
             object: &prepared,
             rig,
         };
-        let outcome = find_grasp(&pool, task, &settings, &NoClock, Stop::NEVER);
+        let outcome = find_grasp(
+            &pool,
+            &Scene::new(task, &settings),
+            &settings,
+            &NoClock,
+            Stop::NEVER,
+        );
         taken += usize::from(outcome.grasp.is_some());
         for (sum, count) in rejections.iter_mut().zip(outcome.report.rejections) {
             *sum += count;

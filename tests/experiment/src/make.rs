@@ -133,7 +133,13 @@ impl Maker {
         // From inside the pool, so that searches on one thread do not include waking it.
         pool.install(|| {
             let start = self.clock.now();
-            let outcome = find_grasp(pool, self.task(cell), &settings, &self.clock, Stop::NEVER);
+            let outcome = find_grasp(
+                pool,
+                &Scene::new(self.task(cell), &settings),
+                &settings,
+                &self.clock,
+                Stop::NEVER,
+            );
             Search {
                 took: self.clock.now().saturating_sub(start),
                 report: outcome.report,

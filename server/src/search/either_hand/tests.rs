@@ -14,6 +14,7 @@ use grasp_synthesis::{
     physical::grip::Gripper,
     search::{
         GraspSource, find_grasp,
+        scene::Scene,
         settings::{Known, Run},
     },
 };
@@ -80,7 +81,8 @@ fn alone(built_in: &BuiltInHoldout, settings: &SearchSettings, side: Handedness)
     let holdout = built_in.to_holdout().expect("built-in holdouts are sound");
     let clock = ReadingsClock::default();
     let task = task(built_in, &holdout, side);
-    find_grasp(&pool(settings.run.workers), task, settings, &clock, Stop::NEVER)
+    let scene = Scene::new(task, settings);
+    find_grasp(&pool(settings.run.workers), &scene, settings, &clock, Stop::NEVER)
 }
 
 /// An answer that is the same with one worker and with three.

@@ -29,7 +29,7 @@ use grasp_synthesis::{
     rating::assessment::GraspContext,
     search::{
         current::{CurrentGrasp, CurrentGraspStatus, Grace, Settlement, settle},
-        find_grasp, prepare,
+        find_grasp,
         scene::{Scene, Task},
         settings::{Run, SearchSettings},
     },
@@ -135,7 +135,7 @@ fn proposals(criterion: &mut Criterion) {
         let scene = scene(object(name));
         let place = ProposalContext {
             object: scene.object,
-            surface: object(name).surface_pairs(),
+            surface: &object(name).surface_pairs,
             barriers: Barriers::NONE,
             chooses: None,
             rig: rig(),
@@ -216,7 +216,7 @@ impl Case {
             object: self.object,
             rig: rig(),
         };
-        prepare(task, &self.settings)
+        Scene::new(task, &self.settings)
     }
 
     fn settle(&self, scene: &Scene<'_>) -> Settlement {
@@ -270,7 +270,13 @@ fn found(holdout: &Holdout, object: &PreparedObject, seed: u64) -> Option<HandPo
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let pool = pool.expect("a thread can be started");
-    let outcome = find_grasp(&pool, task, &settings, &NoTime, Stop::NEVER);
+    let outcome = find_grasp(
+        &pool,
+        &Scene::new(task, &settings),
+        &settings,
+        &NoTime,
+        Stop::NEVER,
+    );
     outcome.grasp.map(|grasp| grasp.pose)
 }
 

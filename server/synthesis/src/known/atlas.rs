@@ -26,17 +26,17 @@ use crate::{
 };
 
 /// Steps of a score from 0 to 1, as entries store it, and those by which values are compared.
-pub(super) const QUANTA: f32 = 254.0;
+pub(crate) const QUANTA: f32 = 254.0;
 const VALUE_STEPS: f32 = 1e6;
 
 /// The known grips of one hand on one object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Atlas {
     grips: Grips,
-    complete: bool,
+    pub(super) complete: bool,
     stamp: u64,
     /// The plane in which these are mirror images of another hand's grips, whose scores they keep.
-    mirror: Option<Mirror>,
+    pub(super) mirror: Option<Mirror>,
 }
 
 impl Atlas {
@@ -69,14 +69,6 @@ impl Atlas {
     /// True if there are no grips.
     pub fn is_empty(&self) -> bool {
         self.entries().is_empty()
-    }
-
-    /// Mirror images of another hand's grips.
-    pub(super) fn of_mirrored(grips: Grips, complete: bool, mirror: Mirror) -> Self {
-        Self {
-            mirror: Some(mirror),
-            ..Self::new(grips, complete)
-        }
     }
 
     /// The place in an entry's scores of a direction `up`, a unit vector against gravity in the object's frame.
@@ -146,15 +138,6 @@ impl Atlas {
         self.complete
     }
 
-    /// The same grips as an atlas that does not grow any further.
-    #[must_use]
-    pub(super) fn completed(self) -> Self {
-        Self {
-            complete: true,
-            ..self
-        }
-    }
-
     /// Identifies the grips: equal for the same grips in the same order.
     pub fn stamp(&self) -> u64 {
         self.stamp
@@ -193,8 +176,7 @@ pub(super) fn stamp(entries: &[Entry]) -> u64 {
         .fold(0, |stamp, &byte| stamp << 8 | u64::from(byte))
 }
 
-/// Largest number of moved grips selected for a holdout, the ones farthest from its barriers by inner spheres. Fewer answer fewer
-/// givers, more delay answers.
+/// Largest number of moved grips selected for a holdout, the ones farthest from its barriers by inner spheres.
 const MAX_SELECTED: usize = 96;
 
 /// Grips compared with one giver by inner spheres between two checks of the stop.
@@ -224,11 +206,8 @@ impl Grips {
         }
     }
 
-    /// The grips that meet the requirements and are farthest from the barriers, moved to the object by `entry`; the first ones win
-    /// ties. `clearance` bounds the distance from the barriers from above, in metres.
-    ///
-    /// # Errors
-    /// [`Stopped`].
+    /// The grips that meet the requirements and are farthest from the barriers, moved to the object by `entry`; the first ones
+    /// win ties.
     pub(super) fn farthest<T: Copy>(
         candidates: impl Iterator<Item = T>,
         clearance: impl Fn(T, Barriers<'_>) -> f32,
@@ -273,21 +252,18 @@ impl Grips {
         &self.forearms
     }
 
-    /// Appends a grip.
     pub(super) fn push(&mut self, rig: &Rig, entry: Entry) {
         self.inner_spheres.push(spheres(&entry.solids(rig), &FIRST));
         self.forearms.push(entry.forearm());
         self.entries.push(entry);
     }
 
-    /// Removes a grip, and moves those after it up.
     pub(super) fn remove(&mut self, index: usize) {
         self.inner_spheres.remove(index);
         self.forearms.remove(index);
         self.entries.remove(index);
     }
 
-    /// Replaces a grip.
     pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
         self.inner_spheres[index] = spheres(&entry.solids(rig), &FIRST);
         self.forearms[index] = entry.forearm();
@@ -301,11 +277,10 @@ impl Grips {
         rig: &Rig,
         barriers: Barriers<'_>,
     ) -> Option<Box<TrackedSolids>> {
-        if self.may_be_clear(entry, barriers) {
-            self.screen_by_second_spheres(entry, rig, barriers)
-        } else {
-            None
+        if !self.may_be_clear(entry, barriers) {
+            return None;
         }
+        self.screen_by_second_spheres(entry, rig, barriers)
     }
 
     /// False if the first inner spheres of grip `entry`, an index into [`Grips::entries`], show that it is too close to a
@@ -329,28 +304,20 @@ impl Grips {
         (!collides).then(|| Box::new(solids))
     }
 
-    /// Upper bound of the barriers' distance, in metres, from thumb, palm, forearm and the best finger subset of a grip, by its
-    /// first inner spheres.
-    pub(super) fn clearance_upper_bound(&self, entry: usize, barriers: Barriers<'_>) -> f32 {
-        self.spheres_upper_bound(entry, &self.inner_spheres[entry], barriers)
-    }
-
-    /// The same for a displaced grip.
-    pub(crate) fn moved_clearance_upper_bound(
+    /// Upper bound of the barriers' distance, in metres, from thumb, palm, forearm and the best finger subset of a grip, which may be
+    /// displaced, by its first inner spheres.
+    pub(super) fn clearance_upper_bound(
         &self,
         entry: usize,
-        displacement: Pose,
+        displacement: Option<Pose>,
         barriers: Barriers<'_>,
     ) -> f32 {
-        self.spheres_upper_bound(
-            entry,
-            &self.inner_spheres[entry].transformed(displacement),
-            barriers,
-        )
-    }
-
-    fn spheres_upper_bound(&self, entry: usize, spheres: &Spheres, barriers: Barriers<'_>) -> f32 {
-        let (fingers, others) = upper_bounds(&FIRST, &barriers.distance_upper_bounds(spheres));
+        let spheres = &self.inner_spheres[entry];
+        let distances = match displacement {
+            Some(displacement) => barriers.distance_upper_bounds(&spheres.transformed(displacement)),
+            None => barriers.distance_upper_bounds(spheres),
+        };
+        let (fingers, others) = upper_bounds(&FIRST, &distances);
         let (_, of_fingers) = self.entries[entry].finger_subsets.farthest(fingers);
         of_fingers.min(others)
     }

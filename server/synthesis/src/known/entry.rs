@@ -59,13 +59,8 @@ impl Entry {
         gripper: &mut Gripper,
     ) -> Self {
         let held = Self::of_held(scene, rig, grip, solids, gripper);
-        let Self {
-            grip,
-            contacts,
-            grip_values,
-            ..
-        } = &held;
-        let of_grip = grip_total(grip_values);
+        let (grip, contacts) = (&held.grip, &held.contacts);
+        let of_grip = grip_total(&held.grip_values);
         let mut friction_uses = FrictionUses::default();
         let scores = std::array::from_fn(|index| {
             let load = scene.load(&gripper.soft_contacts, direction(index));
@@ -80,7 +75,9 @@ impl Entry {
                     force_values(scene, contacts, &balance.forces),
                     upright_values(scene.object, grip.pose.frame_from_wrist, direction(index)),
                 );
-                quantized(of_grip + mean_value(&values))
+                // 0 to 1 as a number from 1 to 255.
+                let score = (of_grip + mean_value(&values)).clamp(0.0, 1.0);
+                (1.0 + score * 254.0).round() as u8
             })
         });
         let finger_subsets = FingerSubsets::of(grip.holding_digits(), |kept| {
@@ -191,16 +188,11 @@ impl Entry {
     pub fn on_resized(&self, scale: f32) -> Self {
         let mut resized = self.clone();
         let wrist = &mut resized.grip.pose.frame_from_wrist;
-        *wrist = self.way_on_resized(scale) * *wrist;
+        *wrist = way_with_contacts(&self.contacts, scale) * *wrist;
         for contact in &mut resized.contacts {
             contact.position *= scale;
         }
         resized
-    }
-
-    /// How the hand moves in [`Self::on_resized`].
-    pub fn way_on_resized(&self, scale: f32) -> Pose {
-        way_with_contacts(&self.contacts, scale)
     }
 
     /// The solids of the hand in the object's frame. Storing them would triple the size of an entry.
@@ -231,11 +223,6 @@ impl Entry {
     }
 }
 
-/// A score in 0 … 1 as a number from 1 to 255.
-fn quantized(score: f32) -> u8 {
-    (1.0 + score.clamp(0.0, 1.0) * 254.0).round() as u8
-}
-
 /// Number of directions that gravity is quantized to, about 18° apart. More order the grips more exactly, and cost 2 bytes and
 /// one balance computation per grip each.
 pub const DIRECTIONS: usize = 64;
@@ -264,15 +251,19 @@ pub fn nearest_direction(up: Vec3) -> usize {
     cosines.iter().position(|&cosine| cosine == highest).unwrap_or(0)
 }
 
+/// The axis nearest to a direction: 0 to 5 for x, -x, y, -y, z, -z.
+pub(crate) fn nearest_axis(direction: Vec3) -> u8 {
+    let axis = direction.abs().max_position();
+    2 * axis as u8 + u8::from(direction[axis] < 0.0)
+}
+
 // One bit per direction.
 const _: () = assert!(DIRECTIONS == 64);
 
 /// The friction use for each of [`DIRECTIONS`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrictionUses {
-    /// Directions with more than sparing use, one bit each.
     more: u64,
-    /// Those of them with full use.
     all: u64,
 }
 
@@ -282,7 +273,6 @@ impl FrictionUses {
         (all & !more == 0).then_some(Self { more, all })
     }
 
-    /// The bits of [`FrictionUses::from_bits`].
     pub(super) fn to_bits(self) -> [u64; 2] {
         [self.more, self.all]
     }

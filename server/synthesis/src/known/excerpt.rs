@@ -25,15 +25,13 @@ use super::{
 };
 use crate::{model::score::Term, physical::receiver::Receiver};
 
-/// Grips on the shortlist of a direction of gravity. Fewer leave more givers without a listed grip; more lower the share of what
-/// ships that nearly all givers leave free.
+/// Grips on the shortlist of a direction of gravity.
 const LIST_LENGTH: usize = 96;
 
 /// Number of sampled givers. With half as many, up to 4 of a hundred holdouts more find no listed grip.
 const SAMPLED_GIVERS: usize = 512;
 
-/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254. More finds a listed grip
-/// for more givers, at lower values.
+/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254.
 const VALUE_MARGIN: u8 = 40;
 
 /// Givers whose gains are added at once: a register of bytes.
@@ -52,23 +50,24 @@ type ClearOf = [u8; PLACES];
 /// The value of a grip for givers by the direction of their forearms; 0 if it lets the object slip.
 type Row = [u8; FOREARMS];
 
-/// The direction of the forearms of the givers of each chunk.
 type Chunks = [usize; PLACES / LANES];
 
-/// The value that the giver at each place is served with.
 type Served = [u8; PLACES];
 
-/// How givers are served under one direction of gravity.
 struct Direction {
     values: Vec<Row>,
-    /// What counts as not served.
     least: Served,
     served: Served,
 }
 
 impl Direction {
     fn new(values: Vec<Row>, chunks: &Chunks, clear_of: &[ClearOf]) -> Self {
-        let least = least_served(&values, chunks, clear_of);
+        let mut best = [SLIPS; PLACES];
+        for (row, clear_of) in values.iter().zip(clear_of) {
+            serve(&mut best, row, chunks, clear_of);
+        }
+        // What is so far below the best clear grip does not count.
+        let least = best.map(|best| best.saturating_sub(VALUE_MARGIN));
         Self {
             values,
             least,
@@ -77,7 +76,6 @@ impl Direction {
     }
 }
 
-/// Grips with the givers that are clear of each.
 struct Candidates {
     chunks: Chunks,
     clear_of: Vec<ClearOf>,
@@ -141,7 +139,6 @@ impl Candidates {
         list
     }
 
-    /// Chooses as long as others serve a giver at all.
     fn fill(&mut self, count: usize, left: &mut Vec<u16>, chosen: &mut Vec<u16>) {
         while chosen.len() < count {
             let before = chosen.len();
@@ -153,11 +150,8 @@ impl Candidates {
     }
 }
 
-/// Grips of which some are kept in any case.
 pub(super) struct Wanted {
-    /// Their indices, ascending.
     pub(super) places: Vec<u16>,
-    /// How many of them are kept, if there are as many.
     pub(super) count: usize,
 }
 
@@ -236,12 +230,10 @@ fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<Cle
     (clear_of, chunks)
 }
 
-/// One of [`FOREARMS`] evenly spread directions.
 fn forearm(index: usize) -> Vec3 {
     direction(index * (DIRECTIONS / FOREARMS))
 }
 
-/// The index of the nearest one.
 fn nearest_forearm(along: Vec3) -> usize {
     let cosine = |&index: &usize| forearm(index).dot(along);
     (0..FOREARMS)
@@ -249,7 +241,6 @@ fn nearest_forearm(along: Vec3) -> usize {
         .unwrap_or(0)
 }
 
-/// The values of all grips for one direction against gravity.
 fn values(entries: &[Entry], up: usize) -> Vec<Row> {
     let receivers: [Receiver; FOREARMS] =
         std::array::from_fn(|giver| Receiver::facing(forearm(giver), Vec3::ZERO, direction(up)));
@@ -263,15 +254,6 @@ fn values(entries: &[Entry], up: usize) -> Vec<Row> {
         })
     };
     entries.iter().map(row).collect()
-}
-
-/// What each giver counts as served with before any grip is listed: the value that does not count next to its best clear grip.
-fn least_served(values: &[Row], chunks: &Chunks, clear_of: &[ClearOf]) -> Served {
-    let mut served = [SLIPS; PLACES];
-    for (row, clear_of) in values.iter().zip(clear_of) {
-        serve(&mut served, row, chunks, clear_of);
-    }
-    served.map(|best| best.saturating_sub(VALUE_MARGIN))
 }
 
 /// Serves the givers that are clear of a grip, if it is better than what they have.
@@ -306,7 +288,6 @@ mod tests {
     use super::*;
     use crate::base::random::AttemptStream;
 
-    /// Givers whose forearms point in all directions.
     fn chunks() -> Chunks {
         std::array::from_fn(|chunk| chunk % FOREARMS)
     }

@@ -45,7 +45,6 @@ impl FingerSubsets {
         (are_subsets && bits >> whole & 1 == 1).then_some(Self(bits))
     }
 
-    /// The bits of [`FingerSubsets::from_bits`].
     pub(super) fn to_bits(self) -> u16 {
         self.0
     }
@@ -83,7 +82,6 @@ impl FingerSubsets {
         }
     }
 
-    /// The set of all fingers that hold has the highest number.
     fn whole_number(self) -> u8 {
         self.0.checked_ilog2().unwrap_or(0) as u8
     }
@@ -93,13 +91,11 @@ impl FingerSubsets {
     }
 }
 
-/// The number of the finger subset among these digits.
 fn number(digits: [bool; 5]) -> u8 {
     let fingers = digits[1..].iter().enumerate();
     fingers.map(|(finger, &is_in)| u8::from(is_in) << finger).sum()
 }
 
-/// The digits of a subset, thumb included.
 fn digits(set: u8) -> [bool; 5] {
     std::array::from_fn(|digit| digit == 0 || set >> (digit - 1) & 1 == 1)
 }

@@ -1,13 +1,9 @@
 //! Grows atlases in rounds of proposals, half of them fresh and half perturbed from known grips. At most a few similar grips are
-//! kept, the best ones (`spread.rs`).
-//!
-//! Every other round has a giver: a known grip plays the hand that holds the object out, and the round searches for grips clear
-//! of it. So the atlas also serves givers who leave little room.
+//! kept, the best ones (`spread.rs`). In every other round, a known grip plays the hand that holds the object out, so that the atlas
+//! also serves givers who leave little room.
 //!
 //! A round's proposals depend only on the rounds before it, and their results are admitted in order. So an atlas is the same for
 //! any number of threads and any interruptions.
-
-mod grown;
 
 use std::{cmp::Reverse, sync::Arc};
 
@@ -16,9 +12,9 @@ use glam::Vec3;
 use super::{
     atlas::{Atlas, Grips, stamp},
     entry::Entry,
-    excerpt::{Wanted, excerpt},
+    excerpt::{Wanted, excerpt, times_listed},
     seeds::Seeds,
-    spread::{Admission, Cell, Occupancy, Spread, base_score},
+    spread::{Admission, Cell, Occupancy, Spread},
 };
 use crate::{
     base::{
@@ -27,7 +23,8 @@ use crate::{
         stopwatch::Stopwatch,
     },
     model::{
-        hand::joints::HandJoints,
+        hand::{joints::HandJoints, rig::Rig},
+        object::GraspObject,
         regions::suits_owner,
         score::{Term, grip_total},
         strategy::Validity,
@@ -51,13 +48,10 @@ use crate::{
     },
 };
 
-pub use self::grown::Grown;
-
 /// Grips of a complete atlas. More offer more choice, and cost time and about 1.3 kilobytes each.
 pub const ENTRIES: usize = 8192;
 
-/// Grips and proposals after which a growth is [enough](Growth::is_enough): some four seconds of work. Four times as many raise
-/// the scores of the chosen grips by a twentieth, and answer a giver in twenty more of very thin objects.
+/// Grips and proposals after which a growth is [enough](Growth::is_enough): some four seconds of work.
 const ENOUGH_GRIPS: usize = 1536;
 const ENOUGH_PROPOSALS: u64 = 24_576;
 
@@ -84,8 +78,7 @@ const PERTURBED_SHARE: f32 = 0.5;
 /// Share of fresh proposals that wrap a handle, if the object has one: people hold it there.
 const HANDLE_SHARE: f32 = 0.5;
 
-/// Share of fresh proposals that hold an object where its owner wants hands, and of the kept grips that do. Chance finds few on
-/// what is small, and a giver leaves none of them.
+/// Share of fresh proposals that hold an object where its owner wants hands, and of the kept grips that do.
 const WANTED_SHARE: f32 = 0.5;
 
 /// Seed of the givers.
@@ -94,14 +87,12 @@ const GIVERS_SEED: u64 = 0x4749_5645;
 /// Number of grips from which on rounds have givers.
 const MIN_GRIPS_FOR_GIVERS: usize = 256;
 
-/// A giver that leaves this many grips clear needs no more, whatever the gravity. For one that leaves fewer, grips are admitted
-/// even to full cells.
+/// A giver that leaves this many grips clear needs no more, whatever the gravity.
 const ENOUGH_CLEAR_GRIPS: usize = 60;
 
 /// Largest number of redraws of a grip from a crowded cell.
 const MAX_REDRAWS: usize = 8;
 
-/// The result of a proposal.
 type Outcome = Option<(Entry, HandShape)>;
 
 /// A known grip that plays the giver's hand.
@@ -112,13 +103,6 @@ struct Giver {
     wanted: SurfacePairs,
     /// Known grips that are nearly clear of it, if it needs more clear grips.
     seeds: Option<Seeds>,
-}
-
-impl Giver {
-    /// True if too few known grips are clear of it.
-    fn needs_grips(&self) -> bool {
-        self.seeds.is_some()
-    }
 }
 
 /// An atlas being grown.
@@ -266,7 +250,7 @@ impl<'a> Growth<'a> {
             .map(|index| self.try_proposal(index, giver.as_ref(), gripper))
             .collect();
         self.proposed += ROUND;
-        let needs_grips = giver.as_ref().is_some_and(Giver::needs_grips);
+        let needs_grips = giver.as_ref().is_some_and(|giver| giver.seeds.is_some());
         for (entry, shape) in found.into_iter().flatten() {
             self.admit(entry, shape, needs_grips);
         }
@@ -275,7 +259,6 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// The giver of this round, if it has one.
     fn draw_giver(&self) -> Option<Giver> {
         let round = self.proposed / ROUND;
         if self.len() < MIN_GRIPS_FOR_GIVERS || round.is_multiple_of(2) {
@@ -294,8 +277,8 @@ impl<'a> Growth<'a> {
         let seeds = (clear.count() < ENOUGH_CLEAR_GRIPS)
             .then(|| unstopped(|stop| Seeds::of(&self.grips, self.rig, all, barriers, stop)));
         Some(Giver {
-            surface: self.prepared.surface_pairs().free_of(barriers),
-            wanted: self.prepared.wanted_pairs().free_of(barriers),
+            surface: self.prepared.surface_pairs.free_of(barriers),
+            wanted: self.prepared.wanted_pairs.free_of(barriers),
             presented: Presented {
                 hands: vec![hand],
                 ..Presented::alone(Vec3::Y)
@@ -319,7 +302,7 @@ impl<'a> Growth<'a> {
             )
             .ok()?;
         // Evaluating the entry takes longest: drop it first if its cell is full.
-        let needs_grips = giver.is_some_and(Giver::needs_grips);
+        let needs_grips = giver.is_some_and(|giver| giver.seeds.is_some());
         let contacts = &gripper.contacts;
         let classification = classify(self.rig, &grip.pose, contacts, &self.scene.object.local_shape);
         let values = grip_values(
@@ -341,9 +324,9 @@ impl<'a> Growth<'a> {
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
         let is_perturbed = !self.is_empty() && stream.unit() < PERTURBED_SHARE;
-        let wanted = giver.map_or(self.prepared.wanted_pairs(), |giver| &giver.wanted);
-        let is_wanted = !wanted.pairs().is_empty() && stream.unit() < WANTED_SHARE;
-        let anywhere = giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface);
+        let wanted = giver.map_or(&self.prepared.wanted_pairs, |giver| &giver.wanted);
+        let is_wanted = !wanted.pairs.is_empty() && stream.unit() < WANTED_SHARE;
+        let anywhere = giver.map_or(&self.prepared.surface_pairs, |giver| &giver.surface);
         let place = ProposalContext {
             object: self.scene.object,
             surface: if is_wanted { wanted } else { anywhere },
@@ -353,7 +336,7 @@ impl<'a> Growth<'a> {
             placements: None,
         };
         match giver.map(|giver| &giver.seeds) {
-            Some(Some(seeds)) if is_perturbed => seeds.propose_evenly(self.grips.entries(), &place, stream),
+            Some(Some(seeds)) if is_perturbed => seeds.propose(self.grips.entries(), true, &place, stream),
             None if is_perturbed => Some(self.perturbed_known(stream)),
             // Perturbing known grips is wasted on a giver with enough clear ones: most of them collide.
             _ if self.prepared.parts().is_handled && stream.unit() < HANDLE_SHARE => {
@@ -363,7 +346,6 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Draws a grip.
     fn draw_grip(&self, stream: &mut AttemptStream) -> usize {
         let mut index = stream.below(self.len());
         for _ in 0..MAX_REDRAWS {
@@ -377,7 +359,6 @@ impl<'a> Growth<'a> {
         index
     }
 
-    /// A hand perturbed from a known grip.
     fn perturbed_known(&self, stream: &mut AttemptStream) -> Proposal {
         let index = self.draw_grip(stream);
         let known = Proposal {
@@ -391,9 +372,9 @@ impl<'a> Growth<'a> {
     /// Admits a grip if its cell has room for it or if it is required.
     fn admit(&mut self, entry: Entry, shape: HandShape, is_required: bool) {
         let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-        match self.spread.admission(cell, base_score(&entry)) {
+        match self.spread.admission(cell, grip_total(&entry.grip_values)) {
             Admission::Replace(index) if !is_required => {
-                self.spread.record(cell, index, base_score(&entry));
+                self.spread.record(cell, index, grip_total(&entry.grip_values));
                 self.grips.replace(self.rig, index, entry);
                 self.shapes[index] = shape;
             }
@@ -405,8 +386,89 @@ impl<'a> Growth<'a> {
 
     fn push(&mut self, entry: Entry, shape: HandShape) {
         let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-        self.spread.record(cell, self.len(), base_score(&entry));
+        self.spread
+            .record(cell, self.len(), grip_total(&entry.grip_values));
         self.grips.push(self.rig, entry);
         self.shapes.push(shape);
+    }
+}
+
+/// Grips that are shipped with an object or a primitive, at about 230 bytes each.
+const SHIPPED: usize = 320;
+
+/// The state of a growth, with everything needed to resume it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grown {
+    /// The grips.
+    pub atlas: Arc<Atlas>,
+    pub(super) shapes: Vec<HandShape>,
+    /// Proposals tried; 0 if these are the listed grips of another atlas.
+    pub proposed: u64,
+    /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before.
+    pub early_stamp: u64,
+    /// Of a growth that goes on: that of the other hand, if these grips are its mirror images.
+    pub(super) original: Option<Arc<Self>>,
+}
+
+impl Grown {
+    /// The growth that goes on: itself, or that of which it is the mirror image.
+    pub fn original(&self) -> &Self {
+        self.original.as_deref().unwrap_or(self)
+    }
+
+    /// The grips on any shortlist, as an incomplete atlas: nearly every giver leaves some of these few free. Resuming from it
+    /// does not continue the growth of the atlas, but starts over.
+    #[must_use]
+    pub fn listed(&self, object: &GraspObject, rig: &Rig) -> Self {
+        let listed = self.times_listed(object, rig).into_iter();
+        self.only(rig, listed.map(|(entry, _)| entry))
+    }
+
+    /// The grips that are on most shortlists, likewise: as many as are shipped.
+    #[must_use]
+    pub fn most_listed(&self, object: &GraspObject, rig: &Rig) -> Self {
+        let mut by_count = self.times_listed(object, rig);
+        by_count.sort_by_key(|&(entry, times)| (Reverse(times), entry));
+        let most = by_count.into_iter().take(SHIPPED);
+        let mut most: Vec<u16> = most.map(|(entry, _)| entry).collect();
+        most.sort_unstable();
+        self.only(rig, most.into_iter())
+    }
+
+    /// The listed grips, ascending, each with the number of shortlists that it is on.
+    fn times_listed(&self, object: &GraspObject, rig: &Rig) -> Vec<(u16, usize)> {
+        let entries = self.atlas.entries();
+        times_listed(entries, &Occupancy::of(object, rig, entries))
+    }
+
+    /// The same grips as a complete atlas.
+    #[must_use]
+    pub fn completed(self) -> Self {
+        let mut atlas = Arc::unwrap_or_clone(self.atlas);
+        atlas.complete = true;
+        Self {
+            atlas: Arc::new(atlas),
+            ..self
+        }
+    }
+
+    fn only(&self, rig: &Rig, places: impl Iterator<Item = u16>) -> Self {
+        let places = places.map(usize::from);
+        let (entries, shapes) = places
+            .map(|place| (self.atlas.entries()[place].clone(), self.shapes[place]))
+            .unzip();
+        Self {
+            atlas: Arc::new(Atlas::new(Grips::new(rig, entries), false)),
+            shapes,
+            proposed: 0,
+            early_stamp: self.early_stamp,
+            original: None,
+        }
+    }
+
+    /// Memory use in bytes.
+    pub fn bytes(&self) -> usize {
+        let of_original = self.original.as_ref().map_or(0, |original| original.bytes());
+        self.atlas.bytes() + size_of_val(self.shapes.as_slice()) + of_original
     }
 }

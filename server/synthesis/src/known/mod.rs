@@ -1,18 +1,13 @@
 //! Known grips: how a hand can hold an object, found before anyone holds it out.
 //!
 //! A grip that passes every check on object and hand alone is valid for every holdout whose giver and gravity allow it. So grips
-//! are collected once per object and rig ([`growth`]) into an [`atlas`]. A request tries them by their score under its gravity;
-//! those that are kept complement one another (`excerpt`). Only the giver's hand and the forces are left to check ([`recheck`]).
-//! The thesis rejects precomputed grasps because a giver may obstruct all of them (section 1). Hence the atlas never answers
-//! alone: a fresh search runs in parallel. What such searches find is kept, too.
+//! are collected once per object and rig ([`growth`]) into an [`atlas`]; of a request, only the giver's hand and the forces are left
+//! to check ([`recheck`]). The thesis rejects precomputed grasps because a giver may obstruct all of them (section 1). Hence the
+//! atlas never answers alone: a fresh search runs in parallel. What such searches find is learned and tried after everything else
+//! that is known; reproducible answers do not depend on it.
 //!
-//! Givers that leave no grip of the atlas free come back: an animation holds an object out the same way each time, and a tracked
-//! hand moves little between two frames. So what their searches find is learned, and tried after everything else that is known;
-//! no seeds are taken from it, and reproducible answers do not depend on it.
-//!
-//! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]). An object without an atlas takes its
-//! seeds from similar boxes ([`primitives`]), one held out at another size from its atlas
-//! ([`seeds`]). Hands that its owner posed follow its surface ([`moved_grips`]).
+//! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]), for an object without an atlas near those
+//! of similar boxes ([`primitives`]). Hands that its owner posed follow a resized surface ([`moved_grips`]).
 
 pub mod atlas;
 pub mod codec;

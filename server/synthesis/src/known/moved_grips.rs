@@ -1,8 +1,6 @@
 //! Grips elsewhere: a posed hand on its object at another size, whose wrist follows the surface while the digits open or close, and
-//! grips of the left hand as mirror images of the right hand's on symmetric objects.
-//!
-//! At a sharp edge, which of two faces a digit touches is a matter of rounding, and a mirror image may decide otherwise. So its
-//! contacts are found anew; an image that does not hold closes its digits again, or is left out.
+//! mirror images on symmetric objects. An image's contacts are found anew, as sharp edges may decide otherwise; one that does not hold
+//! closes its digits again, or is left out.
 
 use std::sync::Arc;
 
@@ -25,7 +23,6 @@ use crate::{
         grip::{Grip, Gripper, PosedDigits},
         presented::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
-        solids::HandSolids,
     },
     propose::both_hands::Mirror,
     rating::scoring::middle,
@@ -45,16 +42,14 @@ const STRIDE_ALONG_FINGERS: usize = 4;
 pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, pose: &HandPose) -> HandPose {
     let alone = Presented::alone(Vec3::Y);
     let mut gripper = Gripper::default();
-    let held = [PosedDigits::Settled, PosedDigits::Still].into_iter();
-    let mut held = held.filter_map(|digits| gripper.hold_posed(own, rig, pose, &alone, digits).ok());
-    let Some((grip, _)) = held.next() else {
-        let wrist = own.object.wrist_at(scale, pose.frame_from_wrist);
+    let mut hold = |digits| gripper.hold_posed(own, rig, pose, &alone, digits).ok();
+    let held = hold(PosedDigits::Settled).or_else(|| hold(PosedDigits::Still));
+    let Some((grip, _)) = held else {
         return HandPose {
-            frame_from_wrist: wrist,
+            frame_from_wrist: own.object.wrist_at(scale, pose.frame_from_wrist),
             ..*pose
         };
     };
-    drop(held);
     let way = way_with_contacts(&gripper.contacts, scale);
     let following = HandPose {
         frame_from_wrist: way * grip.pose.frame_from_wrist,
@@ -106,13 +101,11 @@ pub(super) fn way_with_contacts(contacts: &[Contact], scale: f32) -> Pose {
     Pose::from_position(carried * (scale - 1.0))
 }
 
-/// True if all digits that hold in one grip do in another.
 fn holds_with_digits_of(one: &Grip, other: &Grip) -> bool {
     let mut pairs = one.holding_digits().into_iter().zip(other.holding_digits());
     pairs.all(|(held, holds)| holds || !held)
 }
 
-/// Wrists near one, the nearest first.
 fn wrists_near(wrist: Pose) -> Vec<Pose> {
     let along = (-STEPS_ALONG_FINGERS..=STEPS_ALONG_FINGERS).step_by(STRIDE_ALONG_FINGERS);
     let mut steps: Vec<(i32, i32)> = along
@@ -126,31 +119,23 @@ fn wrists_near(wrist: Pose) -> Vec<Pose> {
     steps.into_iter().map(moved).collect()
 }
 
-/// Makes mirror images of grips.
-struct Images<'a> {
-    mirror: Mirror,
-    scene: ObjectScene<'a>,
-    rig: &'a Rig,
-    gripper: Gripper,
-}
-
 impl Grown {
     /// The same grips of the other hand, `rig`, in a plane about which the object is symmetric.
     #[must_use]
     pub fn mirrored(self, mirror: Mirror, object: &GraspObject, rig: &Rig) -> Self {
-        let mut images = Images {
-            mirror,
-            scene: ObjectScene::new(object, object.friction_under(Validity::Physical)),
-            rig,
-            gripper: Gripper::default(),
-        };
+        let scene = ObjectScene::new(object, object.friction_under(Validity::Physical));
+        let mut gripper = Gripper::default();
         let originals = self.atlas.entries().iter().zip(&self.shapes);
         let (entries, shapes) = originals
-            .filter_map(|(original, &shape)| Some((images.image(original)?, shape)))
+            .filter_map(|(original, &shape)| {
+                Some((image(original, mirror, &scene, rig, &mut gripper)?, shape))
+            })
             .unzip();
         let complete = self.atlas.is_complete();
+        let mut atlas = Atlas::new(Grips::new(rig, entries), complete);
+        atlas.mirror = Some(mirror);
         Self {
-            atlas: Arc::new(Atlas::of_mirrored(Grips::new(rig, entries), complete, mirror)),
+            atlas: Arc::new(atlas),
             shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
@@ -159,36 +144,27 @@ impl Grown {
     }
 }
 
-impl Images<'_> {
-    /// The mirror image of a grip; `None` if it does not hold under the gravity that suits the original best.
-    fn image(&mut self, original: &Entry) -> Option<Entry> {
-        let best = (0..DIRECTIONS).max_by_key(|&index| original.scores[index]);
-        let up = self.mirror.direction(direction(best.unwrap_or_default()));
-        let pose = HandPose {
-            frame_from_wrist: self.mirror.wrist(original.grip.pose.frame_from_wrist),
-            ..original.grip.pose
-        };
-        let held = self.hold(&pose, up, PosedDigits::Still);
-        let (grip, solids) = held.or_else(|| self.hold(&pose, up, PosedDigits::Settled))?;
-        let image = Entry::of_held(&self.scene, self.rig, grip, &solids, &self.gripper);
-        let is_alike = image.contacts.len() == original.contacts.len();
-        Some(Entry {
-            scores: original.scores,
-            friction_uses: original.friction_uses,
-            finger_subsets: if is_alike {
-                original.finger_subsets
-            } else {
-                image.finger_subsets
-            },
-            ..image
-        })
+/// The mirror image of a grip; `None` if it does not hold under the gravity that suits the original best.
+fn image(
+    original: &Entry,
+    mirror: Mirror,
+    scene: &ObjectScene<'_>,
+    rig: &Rig,
+    gripper: &mut Gripper,
+) -> Option<Entry> {
+    let best = (0..DIRECTIONS).max_by_key(|&index| original.scores[index]);
+    let alone = Presented::alone(mirror.direction(direction(best.unwrap_or_default())));
+    let pose = HandPose {
+        frame_from_wrist: mirror.wrist(original.grip.pose.frame_from_wrist),
+        ..original.grip.pose
+    };
+    let mut hold = |digits| gripper.hold_posed(scene, rig, &pose, &alone, digits).ok();
+    let (grip, solids) = hold(PosedDigits::Still).or_else(|| hold(PosedDigits::Settled))?;
+    let mut image = Entry::of_held(scene, rig, grip, &solids, gripper);
+    image.scores = original.scores;
+    image.friction_uses = original.friction_uses;
+    if image.contacts.len() == original.contacts.len() {
+        image.finger_subsets = original.finger_subsets;
     }
-
-    fn hold(&mut self, pose: &HandPose, up: Vec3, digits: PosedDigits) -> Option<(Grip, HandSolids)> {
-        let alone = Presented::alone(up);
-        let held = self
-            .gripper
-            .hold_posed(&self.scene, self.rig, pose, &alone, digits);
-        held.ok()
-    }
+    Some(image)
 }

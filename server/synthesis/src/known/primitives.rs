@@ -1,10 +1,7 @@
-//! Boxes with known grips, for objects that have no atlas yet.
-//!
-//! An object of about the same length, width and thickness as a box can mostly be held where the box can. So the atlases of some
-//! boxes are grown once, like those of the built-in objects, and their shortlisted grips are kept: nearly every giver leaves some
-//! of these free. A search for an object without an atlas starts from those that fit it ([`TransferredGrips`]). Choosing grasps
-//! by shape primitives follows A. T. Miller, S. Knoop, H. I. Christensen and P. K. Allen, "Automatic Grasp Planning Using Shape
-//! Primitives", ICRA 2003, with tested grips instead of their rules.
+//! Boxes with known grips, for objects that have no atlas yet: what is about as long, wide and thick as a box can mostly be held
+//! where the box can. A search for an object without an atlas starts from the grips that fit it ([`TransferredGrips`]). Choosing
+//! grasps by shape primitives follows A. T. Miller, S. Knoop, H. I. Christensen and P. K. Allen, "Automatic Grasp Planning Using
+//! Shape Primitives", ICRA 2003, with tested grips instead of their rules.
 
 use std::sync::Arc;
 
@@ -107,16 +104,13 @@ pub struct HeldPrimitive {
     pub grips: Grips,
 }
 
-/// Largest number of transferred grips, the best fitting ones. More answer few givers more; each costs fifty nanoseconds per
-/// selection and two microseconds once.
+/// Largest number of transferred grips, the best fitting ones.
 const MAX_GRIPS: usize = 1024;
 
-/// Number of boxes that grips are transferred from, the most similar ones. More cover parts that differ from the whole, such as a
-/// knife's blade; too many add grips that fit but do not hold.
+/// Number of boxes that grips are transferred from, the most similar ones.
 const NEAREST_BOXES: usize = 5;
 
-/// Largest distance of thumb and finger from the surface, in metres. More admits grips that do not hold; less leaves so few that
-/// answers come later.
+/// Largest distance of thumb and finger from the surface, in metres.
 const MAX_CONTACT_OFFSET: f32 = 0.002;
 
 /// Grips transferred to the object between two checks of the stop.
@@ -125,12 +119,10 @@ const MOVES_PER_CHECK: usize = 32;
 /// Smallest size in comparisons, in metres: logarithms need a positive one.
 const MIN_SIZE: f32 = 0.001;
 
-/// Distance within which a contact is projected onto the surface, in metres: closing the digits makes up for it. Less loses grips
-/// that hold; more gains none.
+/// Distance within which a contact is projected onto the surface, in metres: closing the digits makes up for it.
 const SNAP_DISTANCE: f32 = 0.004;
 
-/// Cosine of the largest angle between a contact's normal and the surface's: 45°. Stricter and looser limits both pass worse
-/// seeds for thin objects.
+/// Cosine of the largest angle between a contact's normal and the surface's: 45°.
 const SCREEN_COS: f32 = 0.7;
 
 /// The rotations that map a box onto itself: identity, and half a turn about each axis.
@@ -144,13 +136,9 @@ const TURNS: [Quat; 4] = [
 /// A grip of a box on the object. Its pose is derived when needed, which saves memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Transferred {
-    /// Index of the box.
     primitive: u8,
-    /// Index of the rotation in [`TURNS`].
     turn: u8,
-    /// Index of the grip among those of the box.
     grip: u16,
-    /// Does it pass the closure screen on the object?
     passes_screen: bool,
 }
 
@@ -166,7 +154,6 @@ impl Transferred {
 pub struct TransferredGrips {
     known: Arc<[HeldPrimitive]>,
     bounds: SortedBox,
-    /// By how well they fit.
     transferred: Vec<Transferred>,
 }
 
@@ -275,7 +262,7 @@ impl TransferredGrips {
             let held = held(transferred);
             let place = self.bounds.place(held, transferred);
             let grips = &held.grips;
-            grips.moved_clearance_upper_bound(usize::from(transferred.grip), place, barriers)
+            grips.clearance_upper_bound(usize::from(transferred.grip), Some(place), barriers)
         };
         let moved = |transferred| {
             let held = held(transferred);
@@ -305,7 +292,6 @@ impl SortedBox {
         }
     }
 
-    /// The sum of squared logarithms of the ratios of the sizes.
     fn dissimilarity(&self, other: &HeldPrimitive) -> f32 {
         let ratios = self.half_extents / other.primitive.half_extents;
         ratios.to_array().map(|ratio| ratio.ln().powi(2)).iter().sum()

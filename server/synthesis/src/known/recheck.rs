@@ -31,9 +31,7 @@ pub struct GripChecker<'a> {
 impl<'a> GripChecker<'a> {
     /// Prepares checks of grips of an atlas or of no atlas.
     pub fn new(around: GraspContext<'a>, atlas: Option<&Atlas>) -> Self {
-        let GraspContext {
-            object, presented, ..
-        } = around;
+        let (object, presented) = (around.object, around.presented);
         Self {
             around,
             direction: atlas.map_or_else(
@@ -55,22 +53,13 @@ impl<'a> GripChecker<'a> {
         requirements.admits(&grasp).then(|| Box::new(grasp))
     }
 
-    /// The same without the requirements.
-    ///
-    /// # Errors
-    /// The first check that the grip fails.
     pub(crate) fn check_holdout(
         &self,
         entry: &Entry,
         solids: &TrackedSolids,
         gripper: &mut Gripper,
     ) -> Result<Grasp, Check> {
-        let GraspContext {
-            object: scene,
-            presented,
-            rig,
-            ..
-        } = &self.around;
+        let (scene, presented) = (&self.around.object, self.around.presented);
         if !self.around.is_not_banned(entry.grip.pose.frame_from_wrist) {
             return Err(Check::Banned);
         }
@@ -106,14 +95,16 @@ impl<'a> GripChecker<'a> {
             clearances,
         );
         grasp.arm = arm;
-        grasp.score = Some(score(entry.grip_values, &grasp, scene, rig, presented));
+        grasp.score = Some(score(
+            entry.grip_values,
+            &grasp,
+            scene,
+            self.around.rig,
+            presented,
+        ));
         Ok(grasp)
     }
 
-    /// The receiver's arm, if it must reach the grip.
-    ///
-    /// # Errors
-    /// [`Check::Reach`] if it does not.
     pub(crate) fn arm(&self, entry: &Entry) -> Result<Option<ArmPose>, Check> {
         let arm = self.around.required_arm(entry.grip.pose.frame_from_wrist);
         self.around

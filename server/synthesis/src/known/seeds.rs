@@ -13,6 +13,7 @@ use super::{
     atlas::{Atlas, Grips},
     entry::Entry,
     finger_subsets::{FIRST, SECOND, of_digits, spheres, upper_bounds},
+    moved_grips::way_with_contacts,
     primitives::TransferredGrips,
 };
 use crate::{
@@ -37,8 +38,7 @@ use crate::{
 /// Number of seeds. Fewer answer fewer givers; more include grips that are farther from clear and hold less often.
 const SEEDS: usize = 32;
 
-/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone. More find one more often near grips that
-/// are deep in the giver's hand.
+/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone.
 const MAX_DRAWS: usize = 48;
 
 /// Largest displacement along each axis, in metres. Larger ones lose the contacts.
@@ -68,7 +68,7 @@ pub struct Seed {
 /// The known grips that are nearest to being clear of the barriers, by the clearance of palm, forearm, thumb and the finger
 /// subset that is farthest from them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seeds(Vec<Seed>);
+pub struct Seeds(pub Vec<Seed>);
 
 impl Seeds {
     /// Selects from `candidates`, indices into the entries of `known`; earlier ones win ties. Without
@@ -97,7 +97,7 @@ impl Seeds {
         let mut by_upper_bound = Vec::new();
         for (count, index) in candidates.enumerate() {
             stop.check_every(bounds_per_check, count)?;
-            let clearance = known.clearance_upper_bound(usize::from(index), barriers);
+            let clearance = known.clearance_upper_bound(usize::from(index), None, barriers);
             by_upper_bound.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
         // A heap, because sorting would take longer than the interval between clock checks.
@@ -125,36 +125,23 @@ impl Seeds {
         Ok(Self(nearest.into_iter().map(|(_, seed)| seed).collect()))
     }
 
-    /// The seeds, by falling clearance.
-    pub fn all(&self) -> &[Seed] {
-        &self.0
-    }
-
-    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; `None` if none is drawn. `entries`
-    /// are those that the seeds index.
+    /// A perturbed hand that may be clear of the barriers, if one is drawn: near any seed, as serves many givers, if `evenly`, else
+    /// more often near the first. `entries` are those that the seeds index.
     pub fn propose(
         &self,
         entries: &[Entry],
+        evenly: bool,
         place: &ProposalContext<'_>,
         stream: &mut AttemptStream,
     ) -> Option<Proposal> {
-        // The first of 32 is drawn six times as often as under a uniform choice: holdouts that are quick to answer are answered
-        // sooner, the others no later.
-        let rank = (stream.unit().powi(2) * self.0.len() as f32) as usize;
+        let count = self.0.len();
+        let rank = match count {
+            0 if evenly => return None,
+            _ if evenly => stream.below(count),
+            // The first of 32 is drawn six times as often as under a uniform choice.
+            _ => (stream.unit().powi(2) * count as f32) as usize,
+        };
         Self::perturbed(*self.0.get(rank)?, entries, place, stream)
-    }
-
-    /// The same with all seeds equally likely: what serves many givers should not concentrate on a few seeds.
-    pub fn propose_evenly(
-        &self,
-        entries: &[Entry],
-        place: &ProposalContext<'_>,
-        stream: &mut AttemptStream,
-    ) -> Option<Proposal> {
-        if self.0.is_empty() {
-            return None;
-        }
-        Self::perturbed(self.0[stream.below(self.0.len())], entries, place, stream)
     }
 
     /// A hand perturbed from a known grip that may be clear of the barriers, if one is drawn.
@@ -255,19 +242,13 @@ fn clearance(
 
 /// A hand's solids without the fingers that do not hold, which rest elsewhere.
 fn solids_of(kept: [bool; 5], solids: &HandSolids) -> impl Iterator<Item = &TaperedCapsule> + Clone {
-    let HandSolids {
-        phalanges,
-        palm,
-        thenar,
-        forearm,
-    } = solids;
-    let digits = phalanges.iter().zip(kept);
+    let digits = solids.phalanges.iter().zip(kept);
     digits
         .filter_map(|(links, holds)| holds.then_some(links))
         .flatten()
-        .chain(palm)
-        .chain(thenar)
-        .chain(forearm)
+        .chain(&solids.palm)
+        .chain(&solids.thenar)
+        .chain(&solids.forearm)
 }
 
 /// Where seeds come from.
@@ -367,9 +348,9 @@ impl ResizedGrips {
     ) -> Result<Grips, Stopped> {
         let entry = |index: u16| &self.atlas.entries()[usize::from(index)];
         let clearance = |index: u16, barriers: Barriers<'_>| {
-            let way = entry(index).way_on_resized(self.scale);
+            let way = way_with_contacts(&entry(index).contacts, self.scale);
             let grips = self.atlas.grips();
-            grips.moved_clearance_upper_bound(usize::from(index), way, barriers)
+            grips.clearance_upper_bound(usize::from(index), Some(way), barriers)
         };
         let resized = |index: u16| entry(index).on_resized(self.scale);
         Grips::farthest(entries, clearance, resized, around, stop)

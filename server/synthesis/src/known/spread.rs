@@ -5,13 +5,12 @@ use std::{cmp::Reverse, collections::HashMap};
 
 use glam::{IVec3, Vec3};
 
-use super::entry::Entry;
+use super::entry::{Entry, nearest_axis};
 use crate::{
     model::{
         grasp::Contact,
         hand::{Digit, HandPart, HandPose, rig::Rig},
         object::GraspObject,
-        score::grip_total,
     },
     physical::{grip::GIVER_CLEARANCE, solids::TaperedCapsule},
 };
@@ -19,8 +18,7 @@ use crate::{
 /// Edge of the cells that palms are sorted into, in metres.
 const PALM_CELL: f32 = 0.02;
 
-/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from many. Fewer leave
-/// atlases of thin objects unfilled; more leave less choice next to givers.
+/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from many.
 const MAX_PER_CELL: usize = 4;
 
 /// Number of touching fingers from which a hand counts as large: hands with fewer are clear of more givers.
@@ -32,7 +30,6 @@ const MANY_FINGERS: usize = 3;
 pub(super) struct Cell(IVec3, [u8; 2], bool);
 
 impl Cell {
-    /// The cell of a hand that touches an object.
     pub(super) fn of(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> Self {
         let wrist = pose.frame_from_wrist;
         let palm = wrist.transform_point(rig.palm);
@@ -69,7 +66,6 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// What happens to a new grip of this cell and score.
     pub(super) fn admission(&self, cell: Cell, base_score: f32) -> Admission {
         let Some(alike) = self.cells.get(&cell).filter(|alike| alike.len() >= MAX_PER_CELL) else {
             return Admission::Add;
@@ -80,12 +76,10 @@ impl Spread {
         }
     }
 
-    /// The number of grips in a cell.
     pub(super) fn count_in(&self, cell: Cell) -> usize {
         self.cells.get(&cell).map_or(0, Vec::len)
     }
 
-    /// Records the grip at an index of the entries.
     pub(super) fn record(&mut self, cell: Cell, index: usize, base_score: f32) {
         let alike = self.cells.entry(cell).or_default();
         match alike.iter_mut().find(|(entry, _)| *entry == index) {
@@ -95,25 +89,13 @@ impl Spread {
     }
 }
 
-/// The part of an entry's score that depends on neither gravity nor giver.
-pub(super) fn base_score(entry: &Entry) -> f32 {
-    grip_total(&entry.grip_values)
-}
-
-/// The axis nearest to a direction: 0 to 5 for x, -x, y, -y, z, -z.
-fn nearest_axis(direction: Vec3) -> u8 {
-    let axis = direction.abs().max_position();
-    2 * axis as u8 + u8::from(direction[axis] < 0.0)
-}
-
 /// Edge of a cell in metres. Smaller cells separate hands better; memory grows with the third power.
 const CELL: f32 = 0.0125;
 
 /// Largest number of cells. Larger objects get larger cells, which separate hands less well.
 const MAX_CELLS: f32 = 10_000.0;
 
-/// Largest number of cells kept per 512 grips, those that most hands fill: about 2,600 for 8,192 grips. Fewer tell fewer
-/// collisions.
+/// Largest number of cells kept per 512 grips, those that most hands fill: about 2,600 for 8,192 grips.
 const MAX_LINES: usize = 41_600;
 const LINE: usize = 512;
 
@@ -132,7 +114,6 @@ const LANES: usize = 8;
 /// A cell that no hand fills.
 const EMPTY: u16 = u16::MAX;
 
-/// One bit per grip.
 type Bits = Vec<u64>;
 
 /// For each cell around an object that hands fill, the grips of these.
@@ -144,7 +125,6 @@ fn has(grips: &Bits, entry: usize) -> bool {
 }
 
 impl Occupancy {
-    /// The cells that the hands of some grips fill.
     pub(super) fn of(object: &GraspObject, rig: &Rig, entries: &[Entry]) -> Self {
         let surface = object.surface.mesh().aabb();
         let low = surface.min - MARGIN;
@@ -185,13 +165,11 @@ impl Occupancy {
     }
 }
 
-/// The space around an object, divided into cells.
 struct Grid {
     low: Vec3,
     /// Edge of a cell in metres.
     edge: f32,
     counts: IVec3,
-    /// Each cell's place in `filled`, or [`EMPTY`].
     places: Vec<u16>,
     filled: Vec<Bits>,
     none: Bits,
@@ -260,7 +238,6 @@ impl Grid {
         self.filled[usize::from(self.places[cell])][entry / 64] |= 1 << (entry % 64);
     }
 
-    /// A point's cell along each axis.
     fn cell_coordinates(&self, point: Vec3) -> IVec3 {
         ((point - self.low) / self.edge).floor().as_ivec3()
     }

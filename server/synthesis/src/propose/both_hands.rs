@@ -38,7 +38,6 @@ pub enum Aim {
 }
 
 impl Aim {
-    /// The better, the higher, for opposed pads.
     fn merit_of_pair(&self, pair: &SurfacePair) -> f32 {
         let middle = (pair.start + pair.end) * 0.5;
         match *self {
@@ -47,7 +46,6 @@ impl Aim {
         }
     }
 
-    /// The better, the higher, for a palm.
     fn merit_of_point(&self, point: &SurfacePoint) -> f32 {
         match *self {
             Self::Outside { centre, up } => {
@@ -94,7 +92,6 @@ fn flat_palm_shape(rig: &Rig, stream: &mut AttemptStream) -> HandShape {
     }
 }
 
-/// The one with the highest merit of [`COMPARED`] draws.
 fn best_of<T>(mut draw: impl FnMut() -> Option<T>, merit: impl Fn(&T) -> f32) -> Option<T> {
     (0..COMPARED)
         .map_while(|_| draw())
@@ -107,8 +104,7 @@ const MAX_NORMAL_RISE: f32 = 0.5;
 /// Smallest distance of a hand from a plane in whose mirror image the other hand holds, in metres: half a hand's breadth.
 const MIN_DISTANCE: f32 = 0.05;
 
-/// Largest distance of a mirror image from the surface of a symmetric object, in metres: a tenth of how deep digits touch. Points
-/// of the surface that are compared at most.
+/// Largest distance of a mirror image from the surface of a symmetric object, in metres: a tenth of how deep digits touch.
 const ASYMMETRY: f32 = 5e-5;
 const COMPARED_POINTS: usize = 512;
 
@@ -117,31 +113,34 @@ const COMPARED_POINTS: usize = 512;
 pub struct Mirror {
     /// A point of the plane, in metres.
     point: Vec3,
-    /// Its unit normal.
     normal: Vec3,
 }
 
 impl Mirror {
     /// The upright planes through the centre of mass, along the axes of the object's bounding box. `up` is a unit vector.
-    pub fn of_object(object: &GraspObject, up: Vec3) -> impl Iterator<Item = Self> {
+    fn of_object(object: &GraspObject, up: Vec3) -> impl Iterator<Item = Self> {
         let axes = object.bounding_box.object_from_box;
+        let point = object.centre_of_mass;
         Vec3::AXES
-            .map(|axis| axes.transform_vector(axis))
             .into_iter()
-            .filter(move |axis| axis.dot(up).abs() <= MAX_NORMAL_RISE)
-            .map(|normal| Self {
-                point: object.centre_of_mass,
-                normal,
-            })
+            .map(move |axis| axes.transform_vector(axis))
+            .filter(move |normal| normal.dot(up).abs() <= MAX_NORMAL_RISE)
+            .map(move |normal| Self { point, normal })
+    }
+
+    /// The upright planes in whose mirror image the other hand has room next to one at `place`: one that faces it, and those along
+    /// the axes of the object's bounding box. `up` is a unit vector.
+    pub fn beside(object: &GraspObject, up: Vec3, place: Vec3) -> impl Iterator<Item = Self> {
+        let facing = Self::facing(object, up, place).into_iter();
+        let all = facing.chain(Self::of_object(object, up));
+        all.filter(move |mirror| mirror.has_room(place))
     }
 
     /// The upright plane through the centre of mass that faces `place`; `None` if that is above or below it.
     pub fn facing(object: &GraspObject, up: Vec3, place: Vec3) -> Option<Self> {
-        let outward = (place - object.centre_of_mass).reject_from_normalized(up);
-        outward.try_normalize().map(|normal| Self {
-            point: object.centre_of_mass,
-            normal,
-        })
+        let point = object.centre_of_mass;
+        let normal = (place - point).reject_from_normalized(up).try_normalize()?;
+        Some(Self { point, normal })
     }
 
     /// A plane about which an object is symmetric, with its centre of mass and its forbidden surface, if there is one. Takes less
@@ -160,7 +159,7 @@ impl Mirror {
             ];
             middles.map(|point| Self { point, normal })
         });
-        let points = object.surface_pairs().points();
+        let points = &object.surface_pairs.points;
         let stride = points.len().div_ceil(COMPARED_POINTS).max(1);
         let is_symmetric = |mirror: &Self| {
             let is_central = mirror

@@ -1,15 +1,13 @@
-//! Hands that wrap a handle ([`crate::geometry::handles`]) from the palm, and hands that hook their fingers below what an object
-//! may hang by.
-//!
-//! A place to hang by is a thin part above the centre of mass, with room below for a finger and free ways up on both sides of it,
-//! while the part itself goes on to the other two. Spheres of about a finger's thickness probe for that, so bars, wires, straps
-//! and sheets are all found alike.
+//! Hands that wrap a handle ([`crate::geometry::handles`]) from the palm, and hands that hook their fingers below what an object may
+//! hang by: a thin part above the centre of mass, with room below for a finger and free ways up on both sides of it, while the part
+//! itself goes on to the other two. Spheres of about a finger's thickness probe for that.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Mat3, Quat, Vec3};
 
 use super::{
+    opposition::drawn_set,
     proposal::{PALM_START_HEIGHT, ProposalContext, palm_shape},
     surface_pairs::{SurfacePair, SurfacePairs},
 };
@@ -53,12 +51,10 @@ const SKEW: [f32; 2] = [0.05, 0.75];
 /// Range of the place in the palm at which it meets a handle, in metres from the palm's centre: across, and toward the fingers.
 const PALM_OFFSETS: [[f32; 2]; 2] = [[-0.01, 0.01], [0.012, 0.038]];
 
-/// Yaw of the thumb as a share of its range: of a hand around a wire, more per metre of the handle's radius, and the spread. A
-/// thumb that is lifted further passes thin handles by.
+/// Yaw of the thumb as a share of its range: of a hand around a wire, more per metre of the handle's radius, and the spread.
 const THUMB_YAW: [f32; 3] = [0.1, 20.0, 0.2];
 
-/// Range of how far thumb and fingers are closed before, as shares of their range. A thumb that is less so meets what is next to
-/// the handle.
+/// Range of how far thumb and fingers are closed before, as shares of their range.
 const PRESHAPE: [[f32; 2]; 2] = [[0.15, 0.45], [0.0, 0.3]];
 
 /// Places a hand with a handle across its palm. Returns `None` if there is no handle, or no drawn hand fits.
@@ -179,17 +175,14 @@ const MAX_SAG: f32 = 0.01;
 /// Largest number of hands tried until palm and forearm fit.
 const MAX_HOOKED_HANDS: usize = 12;
 
-/// Ranges of the first and the second joint's flexion before the fingers close, in radians. Knuckles that are straighter leave
-/// the fingertips below the bar.
+/// Ranges of the first and the second joint's flexion before the fingers close, in radians.
 const KNUCKLE_FLEXION: [f32; 2] = [0.35, 1.0];
 const MIDDLE_FLEXION: [f32; 2] = [0.7, 1.25];
 
-/// Largest share, of the way from the second joint to the third, at which a hook lifts. With more, the last link is below what it
-/// should hold back.
+/// Largest share, of the way from the second joint to the third, at which a hook lifts.
 const MAX_SHARE_ALONG: f32 = 0.45;
 
-/// Range of the angle in radians by which the hook turns about the bar, fingertips up. With less, the lip is on the knuckles'
-/// side only.
+/// Range of the angle in radians by which the hook turns about the bar, fingertips up.
 const TILT: [f32; 2] = [0.0, 0.45];
 
 /// Range of the gap in metres between the lifting links and what they lift before they close.
@@ -220,7 +213,8 @@ pub struct HangingPlace {
 /// The places by which an object hangs under one direction of gravity.
 #[derive(Clone, Debug, Default)]
 pub struct HangingPlaces {
-    places: Vec<HangingPlace>,
+    /// The places, in no particular order.
+    pub places: Vec<HangingPlace>,
     /// Unit vector against gravity, in the object's frame.
     up: Vec3,
 }
@@ -244,7 +238,7 @@ impl HangingPlaces {
     pub fn of(object: &GraspObject, pairs: &SurfacePairs, up: Vec3, stop: Stop<'_>) -> Result<Self, Stopped> {
         let swing = |point: Vec3| (point - object.centre_of_mass).angle_between(up);
         let mut thin: Vec<&SurfacePair> = pairs
-            .pairs()
+            .pairs
             .iter()
             .filter(|pair| pair.thickness <= MAX_THICKNESS && swing(pair.middle()) <= MAX_SWING)
             .collect();
@@ -259,11 +253,6 @@ impl HangingPlaces {
             places.extend(place.filter(|place| place.swing <= MAX_SWING));
         }
         Ok(Self { places, up })
-    }
-
-    /// The places, in no particular order.
-    pub fn places(&self) -> &[HangingPlace] {
-        &self.places
     }
 
     /// Places a hooked hand whose palm and forearm satisfy `fits`. Returns `None` if there is nothing to hang by, or no drawn
@@ -315,17 +304,9 @@ impl HangingPlaces {
 }
 
 impl Hook {
-    /// A hook for a place.
     fn draw(rig: &Rig, place: &HangingPlace, stream: &mut AttemptStream) -> Self {
-        let mut height = if place.is_broad { stream.unit() } else { 1.0 };
-        let closing = FINGER_SETS
-            .iter()
-            .find(|(_, share)| {
-                height -= share;
-                height < 0.0
-            })
-            .map_or(FINGER_SETS[2].0, |(set, _)| *set);
-        let closing = rig.own_digits(closing);
+        let height = if place.is_broad { stream.unit() } else { 1.0 };
+        let closing = rig.own_digits(drawn_set(FINGER_SETS, height));
         let knuckle = stream.between(KNUCKLE_FLEXION[0], KNUCKLE_FLEXION[1]);
         let second = stream.between(MIDDLE_FLEXION[0], MIDDLE_FLEXION[1]);
         let mut shape = HandShape {

@@ -15,8 +15,7 @@ use crate::{
 /// [`PINCH_WIDTH`], 45° above.
 const MIN_FACING_COS: [f32; 2] = [0.6, 0.7];
 
-/// Range of the bend ratios of thumb and fingers: from nearly straight fingers that flex at the knuckles to curled ones. It
-/// includes those of the thesis' Algorithm 4.
+/// Range of the bend ratios of thumb and fingers: from nearly straight fingers that flex at the knuckles to curled ones.
 const BEND_RATIO: [f32; 2] = [0.35, 1.6];
 
 /// Oppositions sampled per rig. More are more varied, but each adds about 150 µs to the first use of a rig.
@@ -25,8 +24,7 @@ const OPPOSITIONS: usize = 1024;
 /// Upper bound on the draws per rig; on a human-like hand, one in five succeeds.
 const MAX_DRAWS: u64 = 16 * OPPOSITIONS as u64;
 
-/// Range of distances between opposed pads, in metres: from a blade to the widest object a hand can grasp. Sampled log-uniformly,
-/// since a millimetre matters among thin objects.
+/// Range of distances between opposed pads, in metres: from a blade to the widest object a hand can grasp.
 const WIDTH_RANGE: [f32; 2] = [0.003, 0.11];
 
 /// Steps of the local search that brings a hand's pads into opposition.
@@ -47,15 +45,13 @@ const PAD_POSITIONS: [f32; 2] = [0.5, 1.0];
 /// Width in metres up to which an object counts as thin, in [`FINGER_SETS`] and [`MIN_FACING_COS`].
 const PINCH_WIDTH: f32 = 0.015;
 
-/// Share of hands for thin objects in which only the index finger opposes the thumb and the others lie next to it. Raising it
-/// speeds up the search for hands of a clear type on thin objects.
+/// Share of hands for thin objects in which only the index finger opposes the thumb and the others lie next to it.
 const INDEX_ALONE_SHARE: f32 = 0.7;
 
 /// Seed of the draws: arbitrary, but fixed so that a rig always has the same oppositions.
 const SEED: u64 = 0x4f50_504f;
 
 /// Share of oppositions between the thumb and the fingers' distal pads; the others use the middle phalanges, deeper in the hand.
-/// Raising it speeds up the search for hands of a clear type.
 const DISTAL_SHARE: f32 = 0.8;
 
 /// Positions of inner spheres along each solid of the palm and of the forearm: those that collide most often come first.
@@ -65,8 +61,7 @@ const INNER_SPHERE_POSITIONS: [[f32; 3]; 2] = [[0.6, 0.95, 0.2], [0.2, 0.6, 1.0]
 const INNER_SPHERE_GROUPS: usize =
     (INNER_SPHERE_POSITIONS[0].len() * (PALM_SOLIDS + FOREARM_SOLIDS)).div_ceil(SPHERES);
 
-/// Inner spheres of a closing digit: the link, and the position along it. First links are left out, as the palm's spheres cover
-/// them.
+/// Inner spheres of a closing digit: the link, and the position along it.
 const LINK_SPHERE_POSITIONS: [(usize, f32); 3] = [(1, 0.5), (2, 0.2), (2, 1.0)];
 
 /// Groups of [`SPHERES`] inner spheres for the links of five digits.
@@ -89,8 +84,7 @@ pub struct Opposition {
     pub links: [Spheres; LINK_SPHERE_GROUPS],
 }
 
-/// Sets of closing digits, with the shares of hands that use them on thin and on thicker objects. A thin object turns between two
-/// digits, so most hands bring all their fingers to one.
+/// Sets of closing digits, with the shares of hands that use them on thin and on thicker objects.
 const FINGER_SETS: [([bool; 5], [f32; 2]); 4] = [
     ([true, true, false, false, false], [0.05, 0.1]),
     ([true, true, true, false, false], [0.1, 0.25]),
@@ -101,20 +95,14 @@ const FINGER_SETS: [([bool; 5], [f32; 2]); 4] = [
 /// Share of hands that tuck their idle fingers into the palm, as people do when pinching; tucked fingers stay clear of the giver.
 const TUCKED_SHARE: f32 = 0.4;
 
-/// How much wider than the opposed pose a hand is preshaped, as a share of the digits' range. More makes the approach collide
-/// more with object and giver, less leaves thicker parts of the object too thick.
+/// How much wider than the opposed pose a hand is preshaped, as a share of the digits' range.
 const PRESHAPE_OPENING: f32 = 0.22;
 
 /// Draws a hand shape of a rig for an object of a width in metres.
 pub fn draw_shape(rig: &Rig, width: f32, stream: &mut AttemptStream) -> HandShape {
-    let mut height = stream.unit();
-    let closing = FINGER_SETS
-        .iter()
-        .find(|(_, shares)| {
-            height -= shares[usize::from(width > PINCH_WIDTH)];
-            height < 0.0
-        })
-        .map_or(FINGER_SETS[3].0, |(set, _)| *set);
+    let is_thick = usize::from(width > PINCH_WIDTH);
+    let sets = FINGER_SETS.map(|(set, shares)| (set, shares[is_thick]));
+    let closing = drawn_set(sets, stream.unit());
     HandShape {
         thumb_yaw: stream.unit(),
         // The product makes wide spreads rare.
@@ -129,6 +117,15 @@ pub fn draw_shape(rig: &Rig, width: f32, stream: &mut AttemptStream) -> HandShap
     }
 }
 
+/// The set of digits that a number from 0 to 1 falls on by their shares; the last if they sum to less.
+pub(super) fn drawn_set<const N: usize>(sets: [([bool; 5], f32); N], mut height: f32) -> [bool; 5] {
+    let drawn = sets.iter().find(|(_, share)| {
+        height -= share;
+        height < 0.0
+    });
+    drawn.unwrap_or(&sets[N - 1]).0
+}
+
 fn min_facing_cos(width: f32) -> f32 {
     MIN_FACING_COS[usize::from(width > PINCH_WIDTH)]
 }
@@ -136,12 +133,11 @@ fn min_facing_cos(width: f32) -> f32 {
 /// The sampled oppositions of a rig.
 #[derive(Clone, Debug, Default)]
 pub struct Oppositions {
-    /// In ascending order of width.
-    by_width: Vec<Opposition>,
+    pub(super) by_width: Vec<Opposition>,
     /// Their widths in metres, contiguous for binary search.
     widths: Vec<f32>,
     /// Inner spheres of palm and forearm, in the wrist's frame.
-    inner_spheres: [Spheres; INNER_SPHERE_GROUPS],
+    pub(super) inner_spheres: [Spheres; INNER_SPHERE_GROUPS],
 }
 
 impl Oppositions {
@@ -171,11 +167,6 @@ impl Oppositions {
         }
     }
 
-    /// Inner spheres of palm and forearm, in the wrist's frame.
-    pub fn inner_spheres(&self) -> &[Spheres] {
-        &self.inner_spheres
-    }
-
     /// Draws an opposition whose width in metres is between `min` and `max`; `None` if the rig has none.
     pub fn draw(&self, [min, max]: [f32; 2], stream: &mut AttemptStream) -> Option<&Opposition> {
         let first = self.widths.partition_point(|&width| width < min);
@@ -186,11 +177,6 @@ impl Oppositions {
     /// The largest distance between opposed pads, in metres; 0 if the rig has no oppositions.
     pub fn widest(&self) -> f32 {
         self.widths.last().copied().unwrap_or_default()
-    }
-
-    /// The opposition with an index.
-    pub fn get(&self, index: u16) -> &Opposition {
-        &self.by_width[usize::from(index)]
     }
 }
 
@@ -221,9 +207,15 @@ const MOVES_THUMB: [bool; 5] = [true, true, false, true, false];
 /// The opposed pads of a hand.
 #[derive(Clone, Copy, Debug)]
 struct Pads {
-    /// Thumb and fingers: a point on the skin in metres and the direction it faces, in the wrist's frame.
-    thumb: (Vec3, Vec3),
-    fingers: (Vec3, Vec3),
+    thumb: Pad,
+    fingers: Pad,
+}
+
+/// A point on a pad's skin in metres and the direction it faces, in the wrist's frame.
+#[derive(Clone, Copy, Debug)]
+struct Pad {
+    skin: Vec3,
+    facing: Vec3,
 }
 
 impl OpposingHand {
@@ -268,17 +260,12 @@ impl OpposingHand {
         let changed = stream.below(parameters.len());
         parameters[changed] = (parameters[changed] + stream.between(-size, size)).clamp(0.0, 1.0);
         let stepped = self.with_parameters(parameters);
-        let pads = if MOVES_THUMB[changed] {
-            Pads {
-                thumb: stepped.thumb_pad(rig),
-                ..*pads
-            }
+        let mut pads = *pads;
+        if MOVES_THUMB[changed] {
+            pads.thumb = stepped.pad(rig, Digit::Thumb);
         } else {
-            Pads {
-                fingers: stepped.fingers_pad(rig),
-                ..*pads
-            }
-        };
+            pads.fingers = stepped.fingers_pad(rig);
+        }
         (stepped, pads)
     }
 
@@ -310,45 +297,45 @@ impl OpposingHand {
 
     fn pads(&self, rig: &Rig) -> Pads {
         Pads {
-            thumb: self.thumb_pad(rig),
+            thumb: self.pad(rig, Digit::Thumb),
             fingers: self.fingers_pad(rig),
         }
     }
 
-    fn thumb_pad(&self, rig: &Rig) -> (Vec3, Vec3) {
-        pad(
-            rig,
-            Digit::Thumb,
-            &self.shape,
-            2,
-            self.closed[0],
-            self.positions[0],
-        )
-    }
-
-    fn fingers_pad(&self, rig: &Rig) -> (Vec3, Vec3) {
-        let finger = |digit| {
-            pad(
-                rig,
-                digit,
-                &self.shape,
-                self.finger_link,
-                self.closed[1],
-                self.positions[1],
-            )
-        };
+    fn fingers_pad(&self, rig: &Rig) -> Pad {
         // The two fingers next to the thumb decide; the others follow.
         let mut fingers = rig.fingers();
-        let first = finger(fingers.next().unwrap_or(Digit::Index));
+        let first = self.pad(rig, fingers.next().unwrap_or(Digit::Index));
         match fingers.next().filter(|second| self.shape.closing[second.index()]) {
             Some(second) if !self.index_alone => {
-                let second = finger(second);
-                (
-                    (first.0 + second.0) * 0.5,
-                    (first.1 + second.1).normalize_or_zero(),
-                )
+                let second = self.pad(rig, second);
+                Pad {
+                    skin: (first.skin + second.skin) * 0.5,
+                    facing: (first.facing + second.facing).normalize_or_zero(),
+                }
             }
             _ => first,
+        }
+    }
+
+    fn pad(&self, rig: &Rig, digit: Digit) -> Pad {
+        let of_thumb = digit == Digit::Thumb;
+        let link = if of_thumb { 2 } else { self.finger_link };
+        let along = self.positions[usize::from(!of_thumb)];
+        let digit_rig = rig.digit(digit);
+        let radii = link_radii(rig, digit);
+        let angles = self
+            .shape
+            .flexing(rig, digit)
+            .closed_by(self.closed[usize::from(!of_thumb)]);
+        let frame = digit_frames(digit_rig, Pose::IDENTITY, angles).links[link];
+        let radius = radii[link] + (radii[link + 1] - radii[link]) * along;
+        // The last link's solid ends at the centre of the tip's sphere.
+        let beyond = if link == 2 { radii[3] } else { 0.0 };
+        let on_skin = Vec3::new(0.0, along * (digit_rig.lengths[link] - beyond), radius);
+        Pad {
+            skin: frame.transform_point(on_skin),
+            facing: frame.transform_vector(Vec3::Z),
         }
     }
 
@@ -362,8 +349,8 @@ impl OpposingHand {
                 ..self.shape
             },
             closed: self.closed,
-            thumb: pads.thumb.0,
-            fingers: pads.fingers.0,
+            thumb: pads.thumb.skin,
+            fingers: pads.fingers.skin,
             links: self.links(rig),
         })
     }
@@ -392,13 +379,13 @@ impl OpposingHand {
 
 impl Pads {
     fn width(&self) -> f32 {
-        self.thumb.0.distance(self.fingers.0)
+        self.thumb.skin.distance(self.fingers.skin)
     }
 
     /// Cosines between the line through the pads and the directions they face: 1 if they face each other.
     fn facing(&self) -> [f32; 2] {
-        let across = (self.fingers.0 - self.thumb.0).normalize_or_zero();
-        [across.dot(self.thumb.1), -across.dot(self.fingers.1)]
+        let across = (self.fingers.skin - self.thumb.skin).normalize_or_zero();
+        [across.dot(self.thumb.facing), -across.dot(self.fingers.facing)]
     }
 
     /// How far the pads are from opposing each other at a width; 0 once they do with some margin.
@@ -409,18 +396,4 @@ impl Pads {
             .map(|cos| (1.1 * min_facing_cos(width) - cos).max(0.0));
         width_error + 2.0 * (facing_errors[0] + facing_errors[1])
     }
-}
-
-/// A point on the skin of a link's pad in metres, and the direction it faces, in the wrist's frame.
-fn pad(rig: &Rig, digit: Digit, shape: &HandShape, link: usize, closed: f32, along: f32) -> (Vec3, Vec3) {
-    let digit_rig = rig.digit(digit);
-    let radii = link_radii(rig, digit);
-    let angles = shape.flexing(rig, digit).closed_by(closed);
-    let frames = digit_frames(digit_rig, Pose::IDENTITY, angles);
-    let frame = frames.links[link];
-    let radius = radii[link] + (radii[link + 1] - radii[link]) * along;
-    // The last link's solid ends at the centre of the tip's sphere.
-    let beyond = if link == 2 { radii[3] } else { 0.0 };
-    let on_skin = Vec3::new(0.0, along * (digit_rig.lengths[link] - beyond), radius);
-    (frame.transform_point(on_skin), frame.transform_vector(Vec3::Z))
 }

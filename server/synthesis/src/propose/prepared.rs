@@ -101,14 +101,15 @@ impl Deref for PreparedRig {
 #[derive(Debug)]
 pub struct PreparedObject {
     object: Arc<GraspObject>,
-    surface_pairs: SurfacePairs,
-    wanted: SurfacePairs,
-    holdable: HoldableSurface,
-    /// A slot for each rig.
+    /// The points where opposed digits or the palm may press.
+    pub surface_pairs: SurfacePairs,
+    /// Those of them where the object's owner wants hands; empty if that is everywhere.
+    pub wanted_pairs: SurfacePairs,
+    /// Bounds on where it may be held.
+    pub holdable: HoldableSurface,
     placements: Mutex<Vec<CacheSlot>>,
 }
 
-/// A rig and its cache once it is built.
 type CacheSlot = (PreparedRig, Arc<OnceLock<Arc<PlacementCache>>>);
 
 impl PreparedObject {
@@ -123,7 +124,7 @@ impl PreparedObject {
     /// [`Stopped`].
     pub fn new_until(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Self, Stopped> {
         let surface_pairs = SurfacePairs::of(&object, stop)?;
-        let wanted = if object.regions().require_contacts() {
+        let wanted_pairs = if object.regions().require_contacts() {
             surface_pairs.wanted(MAX_MISSED)
         } else {
             SurfacePairs::default()
@@ -134,7 +135,7 @@ impl PreparedObject {
         Ok(Self {
             object,
             surface_pairs,
-            wanted,
+            wanted_pairs,
             holdable,
             placements: Mutex::default(),
         })
@@ -142,7 +143,7 @@ impl PreparedObject {
 
     /// Memory use in bytes of what is derived from the plain object, placement caches of two hands included.
     pub fn derived_bytes(&self) -> usize {
-        let of_pairs = self.surface_pairs.bytes() + self.wanted.bytes();
+        let of_pairs = self.surface_pairs.bytes() + self.wanted_pairs.bytes();
         self.object.derived_bytes() + of_pairs + 2 * PlacementCache::MAX_BYTES
     }
 
@@ -151,27 +152,12 @@ impl PreparedObject {
         &self.object
     }
 
-    /// The points where opposed digits or the palm may press.
-    pub fn surface_pairs(&self) -> &SurfacePairs {
-        &self.surface_pairs
-    }
-
-    /// Those of them where the object's owner wants hands; `None` if that is everywhere.
-    pub fn wanted_pairs(&self) -> &SurfacePairs {
-        &self.wanted
-    }
-
-    /// Bounds on where it may be held.
-    pub fn holdable(&self) -> &HoldableSurface {
-        &self.holdable
-    }
-
     /// The placements at which a hand fits at the object and is likely to hold it. The first call for a rig takes about five
     /// milliseconds.
     pub fn placement_cache(&self, rig: &PreparedRig) -> Arc<PlacementCache> {
         // Built outside the lock, so that searches with other hands are not blocked.
         let slot = self.cache_slot(rig);
-        Arc::clone(slot.get_or_init(|| Arc::new(PlacementCache::of(self, rig))))
+        Arc::clone(slot.get_or_init(|| Arc::new(unstopped(|stop| PlacementCache::of_until(self, rig, stop)))))
     }
 
     /// Builds what [`Self::placement_cache`] returns, unless it is stopped. Meanwhile, others may build it, too.
@@ -292,7 +278,6 @@ const MAX_RIGS: usize = 4;
 /// A hand that fits at the object, in a form that wastes no bytes on alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct CachedPlacement {
-    /// The index of its opposition among the rig's.
     opposition: u16,
     pair: SurfacePair,
     position: Vec3,
@@ -301,15 +286,12 @@ struct CachedPlacement {
 
 impl CachedPlacement {
     fn of(candidate: &Candidate<'_>) -> Self {
-        let Pose {
-            position,
-            orientation,
-        } = candidate.object_from_wrist;
+        let wrist = candidate.object_from_wrist;
         Self {
             opposition: candidate.opposition.index,
             pair: candidate.pair,
-            position,
-            orientation: orientation.to_array(),
+            position: wrist.position,
+            orientation: wrist.orientation.to_array(),
         }
     }
 
@@ -331,15 +313,11 @@ impl PlacementCache {
     /// Upper bound on the size of one cache, in bytes.
     pub const MAX_BYTES: usize = ROWS as usize * KEPT * size_of::<CachedPlacement>();
 
-    /// Samples the placements: about five milliseconds. `None` for a crowded surface.
-    pub fn of(object: &PreparedObject, rig: &PreparedRig) -> Self {
-        unstopped(|stop| Self::of_until(object, rig, stop))
-    }
-
+    /// Samples the placements: about five milliseconds. None on a crowded surface.
     fn of_until(object: &PreparedObject, rig: &PreparedRig, stop: Stop<'_>) -> Result<Self, Stopped> {
         let context = ProposalContext {
             object,
-            surface: object.surface_pairs(),
+            surface: &object.surface_pairs,
             barriers: Barriers::NONE,
             chooses: None,
             rig,
@@ -368,7 +346,7 @@ impl PlacementCache {
     pub fn row<'a>(&'a self, attempt: u64, rig: &'a PreparedRig) -> impl Iterator<Item = Candidate<'a>> {
         let row = usize::try_from(attempt).ok().and_then(|row| self.rows.get(row));
         row.into_iter().flatten().map(|placement| Candidate {
-            opposition: rig.oppositions().get(placement.opposition),
+            opposition: &rig.oppositions().by_width[usize::from(placement.opposition)],
             pair: placement.pair,
             object_from_wrist: placement.object_from_wrist(),
         })

@@ -45,8 +45,7 @@ const MAX_DRAWN_ROTATIONS: usize = 48;
 /// Candidates sampled per proposal and ordered by the success prior. With half or twice as many, searches take longer.
 const COMPARED: usize = 64;
 
-/// Exponent of the success prior when ordering candidates. A larger one finds grasps sooner where the prior is right, but less
-/// varied ones.
+/// Exponent of the success prior when ordering candidates.
 const PREFERENCE: f32 = 2.0;
 
 /// Share of proposals drawn without the success prior, so that grasps it misjudges are found too.
@@ -55,8 +54,7 @@ const EVEN_SHARE: f32 = 0.2;
 /// Largest number of pairs or points drawn until one is clear of the barriers.
 const MAX_DRAWS: usize = 64;
 
-/// Largest distance, in metres, by which a hand placed in an obstacle is moved out of it: about a fingertip's thickness. A thin
-/// object on a table offers points too low for the tips, and edges just above. More moves the digits off the object.
+/// Largest distance, in metres, by which a hand placed in an obstacle is moved out of it: about a fingertip's thickness.
 const MAX_WAY_OUT: f32 = 0.015;
 
 /// How deep inner spheres of the digits may be in the object at the opposed pose, in metres, where it is thin (up to [`THIN`])
@@ -167,7 +165,10 @@ pub fn propose_evenly(
     if stream.unit() < PALM_SHARE {
         return context.propose_palm(stream, stop);
     }
-    context.propose_pads(stream, stop)
+    // Opposed pads at the first of some locations where the hand fits.
+    (0..MAX_LOCATIONS)
+        .take_while(|_| !stop.is_over())
+        .find_map(|_| Some(context.fitting_candidate(stream)?.proposal()))
 }
 
 impl<'a> ProposalContext<'a> {
@@ -193,13 +194,6 @@ impl<'a> ProposalContext<'a> {
             || self.chooses.is_none()
             || stream.attempt().is_multiple_of(ANYWHERE_EVERY)
             || stream.unit() < wish.max(MIN_CHOICE_WEIGHT)
-    }
-
-    /// Places opposed pads at the first of some locations where the hand fits.
-    fn propose_pads(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
-        (0..MAX_LOCATIONS)
-            .take_while(|_| !stop.is_over())
-            .find_map(|_| Some(self.fitting_candidate(stream)?.proposal()))
     }
 
     /// Draws a surface pair and an opposition of its width, and rotates the hand about the line through the pair until it fits.
@@ -266,7 +260,7 @@ impl<'a> ProposalContext<'a> {
         Some(clear.proposal())
     }
 
-    /// Like [`Self::propose_pads`], but tries locations and rotations in the order of the success prior.
+    /// Tries locations and rotations in the order of the success prior.
     fn propose_likely_pads(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
         let features = ObjectFeatures::of(self.object);
         let locations = self.sample_candidates(COMPARED, stream);
@@ -307,15 +301,11 @@ impl<'a> ProposalContext<'a> {
         let mut keyed: Vec<(f32, Candidate<'_>)> = candidates
             .into_iter()
             .map(|candidate| {
-                let Candidate {
-                    opposition,
-                    object_from_wrist,
-                    ..
-                } = candidate;
-                let inputs = features.inputs(self.rig, opposition, object_from_wrist, self.barriers);
+                let wrist = candidate.object_from_wrist;
+                let inputs = features.inputs(self.rig, candidate.opposition, wrist, self.barriers);
                 let log_probability = -(-TRAINED.log_odds(&inputs)).exp().ln_1p();
                 let log_choice = if chooses {
-                    self.choice(object_from_wrist).max(MIN_CHOICE_WEIGHT).ln()
+                    self.choice(wrist).max(MIN_CHOICE_WEIGHT).ln()
                 } else {
                     0.0
                 };
@@ -339,24 +329,33 @@ impl<'a> ProposalContext<'a> {
 
     /// A pair clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
     pub(super) fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
-        (0..MAX_DRAWS)
-            .map_while(|_| {
-                let pair = self.surface.pair(stream)?;
-                let is_taken = pair.is_free_of(self.barriers) && self.is_wanted(pair.wish, stream);
-                Some(is_taken.then_some(pair))
-            })
-            .find_map(|taken| taken)
+        self.free(stream, SurfacePairs::pair, |pair| {
+            (pair.is_free_of(self.barriers), pair.wish)
+        })
+    }
+
+    /// What is drawn first that is clear of the barriers and to be tried, by its wish; `None` if none of [`MAX_DRAWS`] is.
+    fn free<T>(
+        &self,
+        stream: &mut AttemptStream,
+        draw: impl Fn(&SurfacePairs, &mut AttemptStream) -> Option<T>,
+        is_free_with_wish: impl Fn(&T) -> (bool, f32),
+    ) -> Option<T> {
+        for _ in 0..MAX_DRAWS {
+            let drawn = draw(self.surface, stream)?;
+            let (is_free, wish) = is_free_with_wish(&drawn);
+            if is_free && self.is_wanted(wish, stream) {
+                return Some(drawn);
+            }
+        }
+        None
     }
 
     /// A point clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
     pub(super) fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
-        (0..MAX_DRAWS)
-            .map_while(|_| {
-                let point = self.surface.point(stream)?;
-                let is_taken = point.is_free_of(self.barriers) && self.is_wanted(point.wish, stream);
-                Some(is_taken.then_some(point))
-            })
-            .find_map(|taken| taken)
+        self.free(stream, SurfacePairs::point, |point| {
+            (point.is_free_of(self.barriers), point.wish)
+        })
     }
 
     /// True if palm, forearm and digits collide with neither object nor barriers, as far as inner spheres show.
@@ -372,27 +371,19 @@ impl<'a> ProposalContext<'a> {
 
     /// True if palm, forearm and digits are clear of the barriers, as far as inner spheres show.
     fn is_clear_of_barriers(&self, candidate: &Candidate<'_>) -> bool {
-        let spheres = [
-            self.rig.oppositions().inner_spheres(),
-            &candidate.opposition.links,
-        ];
-        spheres
-            .iter()
-            .all(|spheres| !self.spheres_meet_barrier(candidate.object_from_wrist, spheres))
+        let wrist = candidate.object_from_wrist;
+        !self.spheres_meet_barrier(wrist, &self.rig.oppositions().inner_spheres)
+            && !self.spheres_meet_barrier(wrist, &candidate.opposition.links)
     }
 
-    /// Places the palm on the surface at the first of some points where it fits.
+    /// Places the palm on the surface at the first of some free points where it fits.
     fn propose_palm(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
-        (0..MAX_LOCATIONS)
-            .take_while(|_| !stop.is_over())
-            .find_map(|_| self.palm_on_point(stream))
-    }
-
-    /// Places the palm over a free point of the surface.
-    fn palm_on_point(&self, stream: &mut AttemptStream) -> Option<Proposal> {
-        let shape = palm_shape(self.rig, stream);
-        let point = self.free_point(stream)?;
-        self.palm_on(point, shape, |_| true, stream)
+        let mut locations = (0..MAX_LOCATIONS).take_while(|_| !stop.is_over());
+        locations.find_map(|_| {
+            let shape = palm_shape(self.rig, stream);
+            let point = self.free_point(stream)?;
+            self.palm_on(point, shape, |_| true, stream)
+        })
     }
 
     /// Places the palm over a point of the surface, facing it, and rotates it until palm and forearm fit and `admits` accepts the
@@ -437,7 +428,7 @@ impl<'a> ProposalContext<'a> {
     /// True if inner spheres of palm and forearm are clear of object and barriers. This is a hundred times cheaper than the whole
     /// hand's clearance, which is checked later.
     pub fn palm_fits(&self, object_from_wrist: Pose) -> bool {
-        let spheres = self.rig.oppositions().inner_spheres();
+        let spheres = &self.rig.oppositions().inner_spheres;
         self.spheres_fit(object_from_wrist, spheres, MAX_PENETRATION)
     }
 

@@ -1,10 +1,6 @@
-//! The success prior: a small network that estimates, before a hand is closed, how likely it is to hold. It was trained on random
-//! shapes.
-//!
-//! Closing the hand decides, but takes a hundred times longer. The network sees how the object's box and centre of mass lie in
-//! the hand, the object's thickness between the pads, the hand's shape, and how near the giver is to pads and palm. That suffices
-//! to prefer a mug's body or handle over its rim, on which most surface pairs lie. Its weights are data in `weights.txt`;
-//! `assets/PROVENANCE.md` says how they were trained.
+//! The success prior: a small network, trained on random shapes, that estimates before a hand is closed how likely it is to hold.
+//! Closing the hand decides, but takes a hundred times longer. Its weights are data in `weights.txt`; `assets/PROVENANCE.md` says how
+//! they were trained.
 
 use std::sync::LazyLock;
 
@@ -71,33 +67,19 @@ fn next<const N: usize>(numbers: &mut impl Iterator<Item = f32>) -> [f32; N] {
 }
 
 impl Network {
-    /// Standardizes the inputs: standard deviations from the mean, clamped to ±[`MAX_DEVIATION`].
-    pub fn scaled(&self, inputs: &[f32; INPUTS]) -> [f32; INPUTS] {
-        std::array::from_fn(|i| {
-            ((inputs[i] - self.means[i]) * self.scales[i]).clamp(-MAX_DEVIATION, MAX_DEVIATION)
-        })
-    }
-
-    /// Activations of the hidden units for standardized inputs.
-    pub fn units(&self, scaled: &[f32; INPUTS]) -> [f32; UNITS] {
-        let mut units = self.biases;
-        // Indexed, because the compiler does not inline zipped and mapped arrays here.
-        for (inputs, weights) in scaled.iter().zip(&self.weights) {
-            for k in 0..UNITS {
-                units[k] += inputs * weights[k];
-            }
-        }
-        for unit in &mut units {
-            *unit = unit.max(0.0);
-        }
-        units
-    }
-
     /// Log odds that the hand holds.
     pub fn log_odds(&self, inputs: &[f32; INPUTS]) -> f32 {
-        let units = self.units(&self.scaled(inputs));
+        let mut units = self.biases;
+        for (i, weights) in self.weights.iter().enumerate() {
+            let deviation = (inputs[i] - self.means[i]) * self.scales[i];
+            let scaled = deviation.clamp(-MAX_DEVIATION, MAX_DEVIATION);
+            // Indexed, because the compiler does not inline zipped and mapped arrays here.
+            for k in 0..UNITS {
+                units[k] += scaled * weights[k];
+            }
+        }
         let weighted = units.iter().zip(&self.outputs);
-        self.output_bias + weighted.map(|(unit, weight)| unit * weight).sum::<f32>()
+        self.output_bias + weighted.map(|(unit, weight)| unit.max(0.0) * weight).sum::<f32>()
     }
 }
 
@@ -105,7 +87,6 @@ impl Network {
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectFeatures {
     centre_of_mass: Vec3,
-    /// Unit vector along the longest edge of its box.
     long_axis: Vec3,
     /// Logarithms of its box's half extents in metres, longest first.
     log_sizes: [f32; 3],

@@ -19,8 +19,7 @@ use crate::{
     physical::barriers::Barriers,
 };
 
-/// Points sampled on the surface. More cover small parts of large objects better, but each adds about a microsecond to the
-/// registration of an object.
+/// Points sampled on the surface.
 const SAMPLES: u64 = 2048;
 
 /// Seed of the samples: arbitrary, but fixed so that an object always has the same points.
@@ -44,12 +43,10 @@ const FINGER_CLEARANCE: f32 = 0.006;
 /// Minimum distance in metres between a point touched by the palm and another hand.
 const PALM_CLEARANCE: f32 = 0.012;
 
-/// Minimum distance in metres between either point and an obstacle. Fingers reach closer to a flat one, such as the table under a
-/// pen, than to a hand's bulges: with a finger's distance, thin objects on a table offer no points.
+/// Minimum distance in metres between either point and an obstacle.
 const OBSTACLE_CLEARANCE: f32 = 0.003;
 
 /// Opposed places closer than this, in metres, are within any hand's reach and not compared further: most of an adult's span.
-/// Smaller values take longer to prepare large objects.
 const CLOSE: f32 = 0.12;
 
 /// Opposed places farther apart than this, in metres, are beyond any hand.
@@ -108,9 +105,10 @@ impl SurfacePair {
 /// The sampled points and pairs of an object's surface, in the object's frame.
 #[derive(Clone, Debug, Default)]
 pub struct SurfacePairs {
-    pairs: Vec<SurfacePair>,
+    /// The pairs, in the order of the surface's triangles.
+    pub pairs: Vec<SurfacePair>,
     /// Points that may be touched, uniformly distributed over the surface.
-    points: Vec<SurfacePoint>,
+    pub points: Vec<SurfacePoint>,
 }
 
 impl SurfacePairs {
@@ -201,16 +199,6 @@ impl SurfacePairs {
         }
     }
 
-    /// The pairs, in the order of the surface's triangles.
-    pub fn pairs(&self) -> &[SurfacePair] {
-        &self.pairs
-    }
-
-    /// The points that may be touched.
-    pub fn points(&self) -> &[SurfacePoint] {
-        &self.points
-    }
-
     /// Share of the surface that lies opposite a part within a hand's span, from 0 to 1.
     pub fn spanned_share(&self) -> f32 {
         self.pairs.len() as f32 / self.points.len().max(1) as f32
@@ -284,7 +272,7 @@ impl HoldableSurface {
             forbidden_share: (forbidden_area / mesh.area()) as f32,
         };
         // Every pair of surface points opposes, and most objects have close ones.
-        if pairs.pairs().is_empty() && is_oriented(object) {
+        if pairs.pairs.is_empty() && is_oriented(object) {
             holdable.width = lower_bound(opposed_distance(mesh, is_allowed, CLOSE, FAR, stop)?);
             holdable.width_of_all = if object.forbidden_count() == 0 {
                 holdable.width

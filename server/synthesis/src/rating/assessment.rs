@@ -7,7 +7,8 @@ use super::{
 use crate::{
     base::{
         pose::Pose,
-        rejection::Rejection,
+        rejection::{Failure, Rejection},
+        stop::Stop,
         stopwatch::{Step, Stopwatch},
     },
     model::{
@@ -20,10 +21,11 @@ use crate::{
     },
     physical::{
         barriers::BarrierClearances,
-        both_hands::{HalfGrip, SharedHold, hold_together},
+        both_hands::{HalfGrip, hold_together},
         grip::{Grip, Gripper, PosedDigits, clear_of_barriers},
         immobility::{Balance, Buffers, balance},
         presented::{ObjectScene, Presented},
+        shape::Proposal,
         solids::{HandSolids, TrackedSolids},
     },
     thesis::algorithm_1::HeldObject,
@@ -50,9 +52,6 @@ pub struct GraspContext<'a> {
 
 impl GraspContext<'_> {
     /// Checks and rates the grip that `gripper` has just closed, whose hand is `solids`.
-    ///
-    /// # Errors
-    /// The first failed check.
     pub(crate) fn assess(
         &self,
         grip: &Grip,
@@ -89,6 +88,32 @@ impl GraspContext<'_> {
         self.rated(grasp, relative_closure, solids).map(Box::new)
     }
 
+    /// Closes and checks a proposed hand.
+    ///
+    /// # Errors
+    /// The first check that fails, or the stop signal.
+    pub fn hold(
+        &self,
+        proposal: &Proposal,
+        gripper: &mut Gripper,
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
+        let (grip, solids) = self.close(proposal, gripper, stopwatch, stop)?;
+        Ok(self.assess(&grip, &solids, gripper, stopwatch)?)
+    }
+
+    pub(crate) fn close(
+        &self,
+        proposal: &Proposal,
+        gripper: &mut Gripper,
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<(Grip, HandSolids), Failure> {
+        let presented = Some(self.presented);
+        gripper.grip(&self.object, self.rig, proposal, presented, stopwatch, stop)
+    }
+
     /// The grasp of a hand that somebody posed: with digits closed or opened as little as it takes to touch or, if that is not
     /// valid, as they are.
     ///
@@ -119,15 +144,13 @@ impl GraspContext<'_> {
         hangs: bool,
     ) -> Result<Classification, Rejection> {
         let classification = self.classification(&grip.pose, contacts, hangs);
-        if !self.requirements.admits_contacts(contacts)
-            || !self.requirements.admits_type(classification.grasp_type)
-        {
-            return Err(Rejection::UnmetRequirement);
-        }
-        Ok(classification)
+        let is_admitted = self.requirements.admits_contacts(contacts)
+            && self.requirements.admits_type(classification.grasp_type);
+        is_admitted
+            .then_some(classification)
+            .ok_or(Rejection::UnmetRequirement)
     }
 
-    /// The hand's distances from what it keeps clear of.
     pub(super) fn clearances(
         &self,
         grip: &Grip,
@@ -138,7 +161,6 @@ impl GraspContext<'_> {
         clearances.ok_or(Rejection::FingerCollision)
     }
 
-    /// The grasp with its score, if the requirements admit it.
     pub(super) fn rated(
         &self,
         grasp: Grasp,
@@ -158,22 +180,18 @@ impl GraspContext<'_> {
     /// The grasp with its score. `relative_closure` is as for a rated one.
     #[must_use]
     pub(crate) fn scored(&self, mut grasp: Grasp, relative_closure: f32, solids: &HandSolids) -> Grasp {
-        let Self {
-            object,
-            presented,
-            rig,
-            ..
-        } = self;
-        let grip_values = grip_values(
+        let (object, rig) = (&self.object, self.rig);
+        let (pose, contacts, classification) = (&grasp.pose, &grasp.contacts, grasp.classification);
+        let values = grip_values(
             object,
             rig,
-            &grasp.pose,
-            &grasp.contacts,
-            grasp.classification,
+            pose,
+            contacts,
+            classification,
             relative_closure,
             solids,
         );
-        grasp.score = Some(score(grip_values, &grasp, object, rig, presented));
+        grasp.score = Some(score(values, &grasp, object, rig, self.presented));
         grasp
     }
 
@@ -183,7 +201,6 @@ impl GraspContext<'_> {
         object.admits_wrist(self.rig.handedness, object_from_wrist)
     }
 
-    /// The receiver's arm, if it must reach a wrist and does.
     pub(crate) fn required_arm(&self, wrist: Pose) -> Option<ArmPose> {
         let must_reach = self.presented.receiver.must_reach();
         must_reach
@@ -253,11 +270,7 @@ pub(crate) fn thesis_grasp(object: &GraspObject, rig: &Rig, held: HeldObject) ->
     }
 }
 
-/// Checks and rates two hands that hold together: each against its own context, closure and balance for both. The grasp
-/// of the second is [`Grasp::other_hand`] of the first.
-///
-/// # Errors
-/// The first failed check.
+/// Checks and rates two hands that hold together: each against its own context, closure and balance for both.
 pub(crate) fn assess_both(
     around: [&GraspContext<'_>; 2],
     halves: [&HalfGrip; 2],
@@ -268,15 +281,9 @@ pub(crate) fn assess_both(
     let classifications = [classified(0)?, classified(1)?];
     let clearance = |hand: usize| around[hand].clearances(&halves[hand].grip, &halves[hand].solids);
     let clearances = [clearance(0)?, clearance(1)?];
-    let GraspContext {
-        object, presented, ..
-    } = around[0];
-    let held = hold_together(object, presented.up, halves, buffers, stopwatch)?;
-    let SharedHold {
-        epsilon,
-        relative_closure,
-        balances: [first, second],
-    } = held;
+    let presented = around[0].presented;
+    let held = hold_together(&around[0].object, presented.up, halves, buffers, stopwatch)?;
+    let [first, second] = held.balances;
     let total_force: glam::Vec3 = first.forces.iter().chain(&second.forces).sum();
     let rated = |hand: usize, balance| {
         let HalfGrip {
@@ -288,7 +295,7 @@ pub(crate) fn assess_both(
             grip,
             contacts,
             classifications[hand],
-            epsilon,
+            held.epsilon,
             balance,
             presented,
             clearances[hand],
@@ -297,12 +304,9 @@ pub(crate) fn assess_both(
             wrench_angle: total_force.angle_between(presented.up),
             ..unscored
         };
-        around[hand].rated(grasp, relative_closure, solids)
+        around[hand].rated(grasp, held.relative_closure, solids)
     };
-    let first = rated(0, first)?;
-    let second = rated(1, second)?;
-    Ok(Box::new(Grasp {
-        other_hand: Some(Box::new(second)),
-        ..first
-    }))
+    let mut grasp = Box::new(rated(0, first)?);
+    grasp.other_hand = Some(Box::new(rated(1, second)?));
+    Ok(grasp)
 }

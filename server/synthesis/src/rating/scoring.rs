@@ -79,8 +79,7 @@ const AMPLE_GIVER_CLEARANCE: f32 = 0.04;
 /// Distance from forbidden surfaces that scores 1, in metres: the thickness of two fingers.
 const AMPLE_STERILE_CLEARANCE: f32 = 0.03;
 
-/// Mean share of the available friction in use at pressing contacts for which the friction reserve scores 1 and 0. Of all terms,
-/// it best predicts which grips a third-party simulation loses when the object is pushed.
+/// Mean share of the available friction in use at pressing contacts for which the friction reserve scores 1 and 0.
 const FRICTION_USE_RANGE: [f32; 2] = [0.25, 0.7];
 
 /// Minimum share of the total normal force for a contact to count in the friction reserve.

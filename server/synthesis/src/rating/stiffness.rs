@@ -19,8 +19,7 @@ use crate::{
 /// 200 to 800 (A. Hajian and R. Howe, "Identification of the mechanical impedance at the human finger tip", 1997).
 const TIP_STIFFNESS: f64 = 500.0;
 
-/// Stiffness of flesh, normal and tangential, in newtons per metre: 5 N displace it by a third of a millimetre. A smaller one
-/// mainly makes power grasps more compliant.
+/// Stiffness of flesh, normal and tangential, in newtons per metre: 5 N displace it by a third of a millimetre.
 const FLESH_STIFFNESS: f64 = 15_000.0;
 
 /// Pitch joints of a digit.

@@ -1,10 +1,9 @@
 //! One attempt: places, closes and checks a hand according to strategy and validity. If that fails and seeds are known, hands
 //! perturbed from those follow.
 
-use super::{
-    both_hands::BothHands,
-    scene::{Guided, Scene},
-};
+use glam::Vec3;
+
+use super::scene::{Guided, Scene};
 use crate::{
     base::{
         pose::Pose,
@@ -19,37 +18,45 @@ use crate::{
         strategy::Strategy,
     },
     physical::{
+        both_hands::{HalfGrip, are_clear, suits_one_body},
         grip::Gripper,
+        immobility::Buffers,
         shape::{HandShape, Proposal},
+        solids::PreparedHand,
     },
-    propose::prepared::PreparedRig,
-    rating::assessment::{GraspContext, thesis_grasp},
+    propose::{
+        both_hands::{Aim, Mirror},
+        prepared::PreparedRig,
+    },
+    rating::{
+        assessment::{GraspContext, assess_both, thesis_grasp},
+        scoring::middle,
+    },
     thesis::{algorithm_1::ThesisAttempt, finger_posing::PosedDigit, wrist_placement::WristFrame},
 };
 
-/// Perturbed hands that an attempt tries after its fresh one. They answer where a giver leaves little room, but only if a similar
-/// grip is known; fewer leave more time for fresh placements.
+/// Perturbed hands that an attempt tries after its fresh one.
 const SEEDS_PER_ATTEMPT: usize = 16;
 
 /// The scene of an attempt, its random stream, stopwatch and stop.
-pub(super) struct Course<'a, 'b> {
-    pub(super) scene: &'a Scene<'a>,
-    pub(super) stream: &'a mut AttemptStream,
-    pub(super) stopwatch: &'a mut Stopwatch<'b>,
-    pub(super) stop: Stop<'a>,
+struct Course<'a, 'b> {
+    scene: &'a Scene<'a>,
+    stream: &'a mut AttemptStream,
+    stopwatch: &'a mut Stopwatch<'b>,
+    stop: Stop<'a>,
 }
 
 /// The state of an attempt. Reuse it for the next attempt to keep its buffers.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    pruned_placements: u64,
+    /// How many placements the pruning measures discarded before accepting one.
+    pub pruned_placements: u64,
     wrist: WristFrame,
     /// The digits posed by this attempt, thumb first.
     posed: Vec<DigitAngles>,
     thesis: ThesisAttempt,
-    physical: PhysicalAttempt,
+    gripper: Gripper,
     both_hands: BothHands,
-    /// Whether the hand was placed on a handle or to hook in.
     is_special: bool,
 }
 
@@ -60,7 +67,7 @@ impl Default for Attempt {
             wrist: WristFrame::new(Pose::IDENTITY),
             posed: Vec::with_capacity(5),
             thesis: ThesisAttempt::default(),
-            physical: PhysicalAttempt::default(),
+            gripper: Gripper::answering(),
             both_hands: BothHands::default(),
             is_special: false,
         }
@@ -68,11 +75,6 @@ impl Default for Attempt {
 }
 
 impl Attempt {
-    /// How many placements the pruning measures discarded before accepting one.
-    pub fn pruned_placements(&self) -> u64 {
-        self.pruned_placements
-    }
-
     /// Where the attempt placed the wrist.
     pub fn wrist(&self) -> &WristFrame {
         &self.wrist
@@ -141,20 +143,16 @@ impl Attempt {
     /// Algorithm 1, with the wrist placed according to the strategy.
     fn try_by_thesis(&mut self, course: &mut Course<'_, '_>) -> Result<Box<Grasp>, Failure> {
         let Course { scene, stop, .. } = *course;
-        let Self {
-            thesis,
-            wrist,
-            pruned_placements,
-            ..
-        } = self;
         let place_wrist = |stream: &mut AttemptStream| {
-            *wrist = if scene.query.strategy == Strategy::Guided {
+            self.wrist = if scene.query.strategy == Strategy::Guided {
                 WristFrame::new(scene.guided_proposal(stream, stop)?.proposal.object_from_wrist)
             } else {
-                scene.thesis.placer.place(stream, stop, pruned_placements)?
+                let pruned = &mut self.pruned_placements;
+                scene.thesis.placer.place(stream, stop, pruned)?
             };
-            admitted(scene, wrist)
+            admitted(scene, &self.wrist)
         };
+        let thesis = &mut self.thesis;
         let held =
             thesis.try_synthesize_grasp(&scene.thesis, place_wrist, course.stream, course.stopwatch, stop);
         self.posed
@@ -177,8 +175,8 @@ impl Attempt {
         let is_guided = scene.query.strategy == Strategy::Guided;
         let placed = if is_guided {
             scene.guided_proposal(course.stream, stop).map(|guided| {
-                self.is_special = guided.is_special;
-                let Guided { proposal, .. } = guided;
+                let Guided { proposal, is_special } = guided;
+                self.is_special = is_special;
                 (WristFrame::new(proposal.object_from_wrist), Some(proposal))
             })
         } else {
@@ -195,17 +193,16 @@ impl Attempt {
             shape: HandShape::draw(scene.query.bend_ratios, course.stream),
             advance: 0.0,
         });
-        let physical = &mut self.physical;
+        let gripper = &mut self.gripper;
         let held = if is_guided {
-            physical.hold_or_refine(around, &proposal, course.stream, course.stopwatch, stop)
+            hold_or_refine(gripper, around, &proposal, course.stream, course.stopwatch, stop)
         } else {
-            physical.hold(around, &proposal, course.stopwatch, stop)
+            around.hold(&proposal, gripper, course.stopwatch, stop)
         };
-        self.posed.extend_from_slice(&physical.gripper.posed);
+        self.posed.extend_from_slice(&gripper.posed);
         held
     }
 
-    /// Two hands that hold the object together.
     fn try_both_hands(
         &mut self,
         around: &GraspContext<'_>,
@@ -237,14 +234,16 @@ impl Attempt {
         let place = scene.place_of(scene.task.rig);
         for _ in 0..SEEDS_PER_ATTEMPT {
             stop.check()?;
-            let proposal = seeds.propose(entries, &place, course.stream).filter(|proposal| {
-                let wrist = proposal.object_from_wrist;
-                scene.admits_wrist(wrist) && place.is_chosen(wrist, course.stream)
-            });
+            let proposal = seeds
+                .propose(entries, false, &place, course.stream)
+                .filter(|proposal| {
+                    let wrist = proposal.object_from_wrist;
+                    scene.admits_wrist(wrist) && place.is_chosen(wrist, course.stream)
+                });
             course.stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };
-            let physical = &mut self.physical;
-            match physical.hold_or_refine(around, &proposal, course.stream, course.stopwatch, stop) {
+            let gripper = &mut self.gripper;
+            match hold_or_refine(gripper, around, &proposal, course.stream, course.stopwatch, stop) {
                 Ok(grasp) => return Ok(Some(grasp)),
                 Err(Failure::Rejected { .. }) => {}
                 Err(Failure::Stopped) => return Err(Failure::Stopped),
@@ -254,98 +253,218 @@ impl Attempt {
     }
 }
 
-/// The wrist, if it meets the request's requirements.
 fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure> {
-    if scene.admits_wrist(wrist.object_from_wrist) {
-        Ok(*wrist)
-    } else {
-        Err(Rejection::UnmetRequirement.into())
-    }
+    let is_admitted = scene.admits_wrist(wrist.object_from_wrist);
+    let admitted = is_admitted.then_some(*wrist);
+    admitted.ok_or_else(|| Rejection::UnmetRequirement.into())
 }
 
-/// Consecutive perturbations without improvement after which a near miss is given up. More find grasps of thin objects sooner and
-/// those of others later.
+/// Consecutive perturbations without improvement after which a near miss is given up.
 const MAX_FAILED_REFINEMENTS: usize = 4;
 
-/// The hand of an attempt, as far as it got, and its buffers.
-#[derive(Clone, Debug)]
-pub struct PhysicalAttempt {
-    /// Closes the hand.
-    pub gripper: Gripper,
+/// Closes and checks a proposed hand. If it nearly has enough closure, perturbs it repeatedly, each time from the hand with most
+/// closure so far.
+///
+/// # Errors
+/// The first check that the proposed hand fails, an unmet requirement if a perturbed hand fails nothing else, or the stop signal.
+pub fn hold_or_refine(
+    gripper: &mut Gripper,
+    around: &GraspContext<'_>,
+    proposal: &Proposal,
+    stream: &mut AttemptStream,
+    stopwatch: &mut Stopwatch<'_>,
+    stop: Stop<'_>,
+) -> Result<Box<Grasp>, Failure> {
+    let mut rejected = around.hold(proposal, gripper, stopwatch, stop);
+    let (Err(Failure::Rejected { .. }), Some(share)) = (&rejected, gripper.near_miss()) else {
+        return rejected;
+    };
+    // A failed attempt reports the proposed hand, not a perturbed one.
+    let posed = gripper.posed.clone();
+    let mut nearest = (share, *proposal);
+    let mut failures = 0;
+    while failures < MAX_FAILED_REFINEMENTS {
+        failures += 1;
+        let perturbed = nearest.1.perturbed(stream);
+        match around.hold(&perturbed, gripper, stopwatch, stop) {
+            // The hand holds, but not as the requirements demand.
+            Err(unmet) if unmet == Rejection::UnmetRequirement.into() => {
+                rejected = Err(unmet);
+                break;
+            }
+            Err(Failure::Rejected { .. }) => {}
+            end => return end,
+        }
+        if let Some(share) = gripper.near_miss().filter(|&share| share > nearest.0) {
+            nearest = (share, perturbed);
+            failures = 0;
+        }
+    }
+    gripper.posed = posed;
+    rejected
 }
 
-impl Default for PhysicalAttempt {
+/// Hands tried opposite a hand that holds its side. More find holds of lopsided objects sooner, those of others later.
+const OTHER_HANDS: usize = 8;
+
+/// Share of attempts whose first hand must have a mirror image that suits the same body. The others find holds without symmetry.
+const SYMMETRIC_SHARE: f32 = 0.75;
+
+/// The first hand of an attempt, as far as it got, and the buffers of both.
+#[derive(Clone, Debug)]
+struct BothHands {
+    first: Gripper,
+    /// Where the first hand's wrist was placed; `None` if no placement fits.
+    placed: Option<Pose>,
+    other: Gripper,
+    buffers: Buffers,
+}
+
+impl Default for BothHands {
     fn default() -> Self {
         Self {
-            gripper: Gripper::answering(),
+            first: Gripper::sharing(),
+            placed: None,
+            other: Gripper::sharing(),
+            buffers: Buffers::default(),
         }
     }
 }
 
-impl PhysicalAttempt {
-    /// Closes and checks a proposed hand. If it nearly has enough closure, perturbs it repeatedly, each time
-    /// from the hand with most closure so far.
-    ///
-    /// # Errors
-    /// The first check that the proposed hand fails, an unmet requirement if a perturbed hand fails nothing
-    /// else, or the stop signal.
-    pub fn hold_or_refine(
+/// A first hand that holds its side, and what the other hand needs to know of it.
+struct First<'a> {
+    around: &'a GraspContext<'a>,
+    proposal: Proposal,
+    half: HalfGrip,
+    obstacle: PreparedHand,
+    place: Vec3,
+}
+
+impl BothHands {
+    /// Draws and closes a hand, then up to [`OTHER_HANDS`] other hands until one holds together with it.
+    fn hold(
         &mut self,
-        around: &GraspContext<'_>,
-        proposal: &Proposal,
-        stream: &mut AttemptStream,
-        stopwatch: &mut Stopwatch<'_>,
-        stop: Stop<'_>,
+        [around, around_other]: [&GraspContext<'_>; 2],
+        other_rig: &PreparedRig,
+        course: &mut Course<'_, '_>,
     ) -> Result<Box<Grasp>, Failure> {
-        let mut rejected = self.hold(around, proposal, stopwatch, stop);
-        let (Err(Failure::Rejected { .. }), Some(share)) = (&rejected, self.gripper.near_miss()) else {
-            return rejected;
+        self.placed = None;
+        self.first.posed.clear();
+        let first = self.hold_first(around, around_other, course)?;
+        let object = around.object.object;
+        let up = around.presented.up;
+        let mirrors: Vec<Mirror> = Mirror::beside(object, up, first.place).collect();
+        let admits = |wrist: Pose| {
+            around.requirements.admits_wrist(wrist)
+                && suits_one_body(
+                    [
+                        (around.rig, first.half.grip.pose.frame_from_wrist),
+                        (around_other.rig, wrist),
+                    ],
+                    up,
+                )
         };
-        // A failed attempt reports the proposed hand, not a perturbed one.
-        let posed = self.gripper.posed.clone();
-        let mut nearest = (share, *proposal);
-        let mut failures = 0;
-        while failures < MAX_FAILED_REFINEMENTS {
-            failures += 1;
-            let perturbed = nearest.1.perturbed(stream);
-            match self.hold(around, &perturbed, stopwatch, stop) {
-                // The hand holds, but not as the requirements demand.
-                Err(unmet) if unmet == Rejection::UnmetRequirement.into() => {
-                    rejected = Err(unmet);
-                    break;
-                }
-                Err(Failure::Rejected { .. }) => {}
+        let place = course.scene.place_of(other_rig);
+        let mut rejection = Rejection::NoContacts;
+        for attempt in 0..OTHER_HANDS {
+            let proposal = if let Some(mirror) = mirrors.get(attempt) {
+                Some(mirror.proposal(&first.proposal))
+            } else {
+                let across = match mirrors.len() {
+                    0 => 2.0 * object.centre_of_mass - first.place,
+                    count => mirrors[course.stream.below(count)].point(first.place),
+                };
+                place.propose_half(Aim::Near(across), admits, course.stream, course.stop)
+            };
+            course.stopwatch.lap(Step::WristPlacement);
+            course.stop.check()?;
+            let Some(proposal) = proposal else { continue };
+            match self.complete(&first, around_other, &proposal, admits, course) {
+                Err(Failure::Rejected { rejection: other, .. }) => rejection = other,
                 end => return end,
             }
-            if let Some(share) = self.gripper.near_miss().filter(|&share| share > nearest.0) {
-                nearest = (share, perturbed);
-                failures = 0;
-            }
         }
-        self.gripper.posed = posed;
-        rejected
+        Err(rejection.into())
     }
 
-    /// Closes and checks a proposed hand.
-    ///
-    /// # Errors
-    /// The first check that fails, or the stop signal.
-    pub fn hold(
+    fn hold_first<'a>(
         &mut self,
+        around: &'a GraspContext<'_>,
+        around_other: &GraspContext<'_>,
+        course: &mut Course<'_, '_>,
+    ) -> Result<First<'a>, Failure> {
+        let object = around.object.object;
+        let up = around.presented.up;
+        let is_symmetric = course.stream.unit() < SYMMETRIC_SHARE;
+        let admits = |wrist: Pose| {
+            let palm = wrist.transform_point(around.rig.palm);
+            let suits = |mirror: Mirror| {
+                suits_one_body([(around.rig, wrist), (around_other.rig, mirror.wrist(wrist))], up)
+            };
+            around.requirements.admits_wrist(wrist)
+                && (!is_symmetric || Mirror::beside(object, up, palm).any(suits))
+        };
+        let aim = Aim::Outside {
+            centre: object.centre_of_mass,
+            up,
+        };
+        let proposal = course.scene.place_of(course.scene.task.rig).propose_half(
+            aim,
+            admits,
+            course.stream,
+            course.stop,
+        );
+        course.stopwatch.lap(Step::WristPlacement);
+        course.stop.check()?;
+        let proposal = proposal.ok_or(Rejection::NoContacts)?;
+        self.placed = Some(proposal.object_from_wrist);
+        let half = close_half(&mut self.first, around, &proposal, course)?;
+        Ok(First {
+            around,
+            proposal,
+            obstacle: PreparedHand::new(&half.tracked(around.rig)),
+            place: middle(half.contacts.iter()),
+            half,
+        })
+    }
+
+    fn complete(
+        &mut self,
+        first: &First<'_>,
         around: &GraspContext<'_>,
         proposal: &Proposal,
-        stopwatch: &mut Stopwatch<'_>,
-        stop: Stop<'_>,
+        admits: impl Fn(Pose) -> bool,
+        course: &mut Course<'_, '_>,
     ) -> Result<Box<Grasp>, Failure> {
-        let GraspContext {
-            object,
-            presented,
-            rig,
-            ..
-        } = around;
-        let (grip, solids) = self
-            .gripper
-            .grip(object, rig, proposal, Some(presented), stopwatch, stop)?;
-        Ok(around.assess(&grip, &solids, &mut self.gripper, stopwatch)?)
+        let half = close_half(&mut self.other, around, proposal, course)?;
+        // Closing may have moved either wrist since its placement.
+        if !admits(half.grip.pose.frame_from_wrist) {
+            return Err(Rejection::UnmetRequirement.into());
+        }
+        let is_clear = are_clear(&first.obstacle, &half.tracked(around.rig));
+        course.stopwatch.lap(Step::CollisionValidation);
+        if !is_clear {
+            return Err(Rejection::FingerCollision.into());
+        }
+        Ok(assess_both(
+            [first.around, around],
+            [&first.half, &half],
+            &mut self.buffers,
+            course.stopwatch,
+        )?)
     }
+}
+
+fn close_half(
+    gripper: &mut Gripper,
+    around: &GraspContext<'_>,
+    proposal: &Proposal,
+    course: &mut Course<'_, '_>,
+) -> Result<HalfGrip, Failure> {
+    let (grip, solids) = around.close(proposal, gripper, course.stopwatch, course.stop)?;
+    Ok(HalfGrip {
+        grip,
+        solids,
+        contacts: gripper.contacts.clone(),
+    })
 }

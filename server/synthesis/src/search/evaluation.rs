@@ -5,8 +5,12 @@ use glam::Vec3;
 use super::{scene::Task, settings::SearchSettings};
 use crate::{
     base::stop::Stop,
-    known::{entry::Entry, recheck::GripChecker},
+    known::{
+        entry::{Entry, nearest_axis},
+        recheck::GripChecker,
+    },
     model::{
+        grasp::Grasp,
         holdout::{HandShape, Holdout},
         requirements::Check,
         score::Score,
@@ -15,7 +19,6 @@ use crate::{
         barriers::Barriers,
         grip::{Gripper, PosedDigits, clear_of_barriers},
         presented::Presented,
-        solids::TrackedSolids,
     },
 };
 
@@ -99,34 +102,27 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
     let around = query.around(holdout, &presented, rig);
     let checker = GripChecker::new(around, settings.known.atlas.as_deref());
     let barriers = by_kind(holdout, &presented);
+    let grips = settings.known.atlas.as_ref().map(|atlas| atlas.grips());
     let mut gripper = Gripper::default();
     let mut evaluation = Evaluation::default();
-    let mut count = |entry: &Entry, place: Option<usize>, gripper: &mut Gripper| {
-        let may_be_clear = |barriers: Barriers<'_>| {
-            let grips = settings.known.atlas.as_ref().map(|atlas| atlas.grips());
-            grips
-                .zip(place)
-                .is_none_or(|(grips, place)| grips.may_be_clear(place, barriers))
-        };
-        let is_clear = |solids: &TrackedSolids, barriers: Barriers<'_>| {
-            barriers.is_empty() || may_be_clear(barriers) && clear_of_barriers(solids, barriers).is_some()
-        };
+    let check = |entry: &Entry, place: Option<usize>, gripper: &mut Gripper| {
         let solids = entry.tracked_solids(rig);
-        let obstructing = barriers
-            .into_iter()
-            .zip(HINDRANCES)
-            .find_map(|(barriers, what)| (!is_clear(&solids, barriers)).then_some(what));
-        let outcome = obstructing.map_or_else(
-            || {
-                let wrist = entry.grip.pose.frame_from_wrist;
-                let is_reached = query.requirements.reaches(wrist) && checker.arm(entry).is_ok();
-                is_reached.then_some(()).ok_or(Check::Reach)?;
-                let grasp = checker.check_holdout(entry, &solids, gripper)?;
-                let is_admitted = entry.meets(&query.requirements) && query.requirements.admits(&grasp);
-                is_admitted.then_some(grasp).ok_or(Check::Requirements)
-            },
-            Err,
-        );
+        for (barriers, what) in barriers.into_iter().zip(HINDRANCES) {
+            let known = grips.zip(place);
+            let may_be_clear = || known.is_none_or(|(grips, place)| grips.may_be_clear(place, barriers));
+            let is_clear = || may_be_clear() && clear_of_barriers(&solids, barriers).is_some();
+            if !barriers.is_empty() && !is_clear() {
+                return Err(what);
+            }
+        }
+        if !query.requirements.reaches(entry.grip.pose.frame_from_wrist) || checker.arm(entry).is_err() {
+            return Err(Check::Reach);
+        }
+        let grasp = checker.check_holdout(entry, &solids, gripper)?;
+        let is_admitted = entry.meets(&query.requirements) && query.requirements.admits(&grasp);
+        is_admitted.then_some(grasp).ok_or(Check::Requirements)
+    };
+    let mut count = |entry: &Entry, outcome: Result<Grasp, Check>| {
         let side = &mut evaluation.sides[side_of(entry)];
         side.known += 1;
         match outcome {
@@ -148,31 +144,33 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
             return evaluation;
         }
         // One that does not hold the object at all is no grip.
-        let held = [PosedDigits::Settled, PosedDigits::Still].into_iter();
-        let held =
-            held.filter_map(|digits| gripper.hold_posed(&around.object, rig, pose, &alone, digits).ok());
+        let mut hold = |digits| gripper.hold_posed(&around.object, rig, pose, &alone, digits).ok();
+        let held = hold(PosedDigits::Settled).or_else(|| hold(PosedDigits::Still));
         // What hangs is no grip for other directions of gravity.
-        if let Some((grip, solids)) = { held }.next()
+        if let Some((grip, solids)) = held
             && gripper.hang.is_none()
         {
             let entry = Entry::of_held(&around.object, rig, grip, &solids, &gripper);
-            count(&entry, None, &mut gripper);
+            count(&entry, check(&entry, None, &mut gripper));
         }
     }
-    let Some(atlas) = settings.known.atlas.as_ref() else {
-        return evaluation;
-    };
-    for index in atlas.by_score(presented.up) {
+    for index in settings
+        .known
+        .atlas
+        .iter()
+        .flat_map(|atlas| atlas.by_score(presented.up))
+    {
         if stop.check().is_err() {
             return evaluation;
         }
         let place = usize::from(index);
-        count(&atlas.entries()[place], Some(place), &mut gripper);
+        if let Some(entry) = grips.map(|grips| &grips.entries()[place]) {
+            count(entry, check(entry, Some(place), &mut gripper));
+        }
     }
     evaluation
 }
 
-/// The barriers of the first three of [`HINDRANCES`].
 fn by_kind<'a>(holdout: &Holdout, presented: &'a Presented) -> [Barriers<'a>; 3] {
     let all = presented.barriers();
     let giver = holdout.presenting_hand.as_ref();
@@ -196,7 +194,6 @@ fn by_kind<'a>(holdout: &Holdout, presented: &'a Presented) -> [Barriers<'a>; 3]
     [presenting, others, obstacles]
 }
 
-/// The place in [`HINDRANCES`] of a check that a grip fails.
 fn place_of(check: Check) -> Option<usize> {
     let check = if check == Check::Banned {
         Check::Requirements
@@ -209,6 +206,5 @@ fn place_of(check: Check) -> Option<usize> {
 /// The place in [`SIDES`] of the direction that a hand comes from.
 fn side_of(entry: &Entry) -> usize {
     let from = entry.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
-    let nearest = (0..SIDES.len()).max_by(|&a, &b| SIDES[a].dot(from).total_cmp(&SIDES[b].dot(from)));
-    nearest.unwrap_or_default()
+    usize::from(nearest_axis(from))
 }

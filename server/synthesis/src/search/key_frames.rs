@@ -4,14 +4,13 @@
 //! end of the motion (M. Jeannerod, "The timing of natural prehension movements", 1984). So do these frames: from `APPROACH` to
 //! `PRE_GRASP` the open hand moves along a line; from `PRE_GRASP` to `CLOSE` its digits bend, all joints of a digit in
 //! proportion. Between two frames the wrist moves straight without turning, and joint angles change linearly. This motion is
-//! checked continuously (`motion`), not at samples.
-
-mod motion;
+//! checked continuously, not at samples: a part of it is free if, at its midpoint, every solid is farther from all obstacles than any
+//! of its points travels from there to the part's ends; a part that is undecided is halved (interval halving on the bound of
+//! conservative advancement: B. Mirtich, "Timewarp Rigid Body Simulation", 2000).
 
 use std::cell::{Cell, OnceCell};
 
 use glam::Vec3;
-use motion::{Clearances, Motion, Obstacles};
 
 use crate::{
     base::pose::Pose,
@@ -19,13 +18,15 @@ use crate::{
         grasp::{Grasp, KeyFrame, Stage},
         hand::{Digit, DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
         holdout::Holdout,
+        object::GraspObject,
         requirements::{ApproachCone, approach_direction},
     },
     physical::{
+        barriers::Barriers,
         grip::{GIVER_CLEARANCE, MAX_PENETRATION},
         presented::{ObjectScene, Presented},
         shape::Flexing,
-        solids::{HandSolids, TRACKED_SOLIDS, TrackedSolids, comes_within, self_clearance},
+        solids::{HandSolids, TRACKED_SOLIDS, TaperedCapsule, TrackedSolids, comes_within, self_clearance},
     },
     rating::assessment::GraspContext,
 };
@@ -38,8 +39,7 @@ pub const OPEN_CLEARANCE: f32 = 0.002;
 /// looks more like reaching, and collides with barriers more often.
 pub const APPROACH_DISTANCE: f32 = 0.12;
 
-/// Distances by which fingertips open, in metres, or as far as the joints allow. The first that is free for all digits is taken,
-/// then the smallest that is free for each.
+/// Distances by which fingertips open, in metres, or as far as the joints allow.
 const OPENINGS: [f32; 5] = [0.025, 0.035, 0.05, 0.07, f32::INFINITY];
 
 /// Distances from `PRE_GRASP` to `CLOSE`, in metres: none if the hand can open in place, and some for a palm that rests on the
@@ -63,17 +63,9 @@ const MAX_POSES_OF_WITHDRAWAL: u32 = 200;
 /// not reject the grasp itself.
 const BARRIER_CLEARANCE: f32 = 0.9 * GIVER_CLEARANCE;
 
-/// Clearances during the approach.
-const APPROACH_CLEARANCES: Clearances = Clearances {
-    object: 0.5 * OPEN_CLEARANCE,
-    barriers: BARRIER_CLEARANCE,
-};
-
-/// Clearances while closing: the hand may sink in as deep as in a grasp.
-const CLOSING_CLEARANCES: Clearances = Clearances {
-    object: -MAX_PENETRATION,
-    barriers: BARRIER_CLEARANCE,
-};
+/// Least distance from the object during the approach, and while closing: the hand may sink in as deep as in a grasp.
+const APPROACH_CLEARANCE: f32 = 0.5 * OPEN_CLEARANCE;
+const CLOSING_CLEARANCE: f32 = -MAX_PENETRATION;
 
 /// Plans the key frames of a grasp that is valid under `PHYSICAL`; others have none. `approach` limits the approach direction, in
 /// the object's frame.
@@ -125,16 +117,10 @@ pub fn key_frames(
     ])
 }
 
-/// The hand displaced.
 fn moved(pose: &HandPose, displacement: Vec3) -> HandPose {
-    let Pose {
-        position,
-        orientation,
-    } = pose.frame_from_wrist;
-    HandPose {
-        frame_from_wrist: Pose::new(position + displacement, orientation),
-        digits: pose.digits,
-    }
+    let mut moved = *pose;
+    moved.frame_from_wrist.position += displacement;
+    moved
 }
 
 struct Planner<'a> {
@@ -147,7 +133,6 @@ struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// The approach direction and the hand of `PRE_GRASP`.
     fn plan(&self) -> Option<(Vec3, HandPose)> {
         // Digits that hold nothing open with the others, or else stay where they are.
         let opening_digits = |i: usize| {
@@ -291,13 +276,12 @@ impl Planner<'_> {
             && self_clearance(self.rig, &solids.hand) >= 0.0
     }
 
-    /// True if the straight approach to an open hand is free.
     fn approach_is_free(&self, pre_grasp: &TrackedSolids, direction: Vec3) -> bool {
         let motion = Motion {
             solids_at: |share: f32| pre_grasp.moved(direction * (APPROACH_DISTANCE * (share - 1.0))),
             travels: pre_grasp.iter().map(|_| APPROACH_DISTANCE).collect(),
         };
-        motion.is_free(&self.obstacles, APPROACH_CLEARANCES)
+        motion.is_free(&self.obstacles, APPROACH_CLEARANCE)
     }
 
     /// True if the hand can close from an open one whose wrist is `back` metres before it.
@@ -319,7 +303,7 @@ impl Planner<'_> {
             },
             travels: self.closing_travels(open, back),
         };
-        motion.is_free(&self.obstacles, CLOSING_CLEARANCES)
+        motion.is_free(&self.obstacles, CLOSING_CLEARANCE)
     }
 
     /// An upper bound, in metres, of the travel of any point of each of the hand's solids while it closes.
@@ -402,4 +386,147 @@ pub(super) fn withdrawal(around: &GraspContext<'_>, hand: &HandPose) -> HandPose
         }
     }
     moved(&opened, end.or(natural).unwrap_or_default())
+}
+
+/// A part is not halved further if nothing travels farther than this in half of it, in metres: the accuracy of the check.
+const RESOLUTION: f32 = 0.0001;
+
+/// Search distance beyond the known lower bound of an obstacle's distance, in metres.
+const LOOKAHEAD: f32 = 0.008;
+
+/// What a moving hand may collide with.
+#[derive(Debug)]
+struct Obstacles<'a> {
+    object: &'a GraspObject,
+    barriers: Barriers<'a>,
+    /// How many more hand poses may be checked before the motion counts as blocked: bounds the time of hopeless cases.
+    poses_left: Cell<u32>,
+}
+
+struct Motion<F> {
+    /// The hand at a fraction of the motion, from 0 to 1.
+    solids_at: F,
+    /// Upper bound, in metres, of the travel of any point of each solid, in the order of [`TrackedSolids::iter`].
+    travels: Vec<f32>,
+}
+
+/// The result of checking a part of a motion at its midpoint.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    Free,
+    Blocked,
+    /// The halves have to be checked.
+    Undecided,
+}
+
+impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
+    /// True if the motion keeps the clearances: that of the object, in metres, negative for the largest depth, and
+    /// [`BARRIER_CLEARANCE`]. Forbidden surfaces are never touched.
+    fn is_free(&self, obstacles: &Obstacles<'_>, clearance: f32) -> bool {
+        // Solids that do not move stay where they are in the grasp.
+        let moving = self
+            .travels
+            .iter()
+            .enumerate()
+            .filter(|(_, travel)| **travel > 0.0);
+        let undecided = moving.fold(0, |undecided, (place, _)| undecided | 1 << place);
+        // The hand's own solids come first; only they are compared with the object.
+        let against_object = undecided & ((1 << HandSolids::COUNT) - 1);
+        let against_barriers = if obstacles.barriers.is_empty() {
+            0
+        } else {
+            undecided
+        };
+        self.is_part_free(
+            obstacles,
+            clearance,
+            [0.0, 1.0],
+            [against_object, against_barriers],
+        )
+    }
+
+    fn is_part_free(
+        &self,
+        obstacles: &Obstacles<'_>,
+        clearance: f32,
+        [from, to]: [f32; 2],
+        undecided: [u64; 2],
+    ) -> bool {
+        let Some(poses_left) = obstacles.poses_left.get().checked_sub(1) else {
+            return false;
+        };
+        obstacles.poses_left.set(poses_left);
+        let middle = 0.5 * (from + to);
+        let half = 0.5 * (to - from);
+        let mut still_undecided = [0; 2];
+        let solids = (self.solids_at)(middle);
+        for (place, (solid, travel)) in solids.iter().zip(&self.travels).enumerate() {
+            let travel = half * travel;
+            for against in 0..2 {
+                if undecided[against] >> place & 1 == 0 {
+                    continue;
+                }
+                let verdict = if against == 0 {
+                    against_object(obstacles, solids.hand.solid(place), clearance, travel)
+                } else {
+                    against_barriers(obstacles.barriers, solid, travel)
+                };
+                match verdict {
+                    Verdict::Free => {}
+                    Verdict::Blocked => return false,
+                    Verdict::Undecided => still_undecided[against] |= 1 << place,
+                }
+            }
+        }
+        still_undecided == [0; 2]
+            || [[from, middle], [middle, to]]
+                .into_iter()
+                .all(|part| self.is_part_free(obstacles, clearance, part, still_undecided))
+    }
+}
+
+/// Checks a solid that travels up to `travel` metres against the barriers.
+fn against_barriers(barriers: Barriers<'_>, solid: &TaperedCapsule, travel: f32) -> Verdict {
+    let least = BARRIER_CLEARANCE;
+    barriers
+        .least_distance([solid].into_iter(), least + travel, least)
+        .map_or(Verdict::Blocked, |distance| classify(distance, least, travel))
+}
+
+/// Checks a solid that travels up to `travel` metres against the object.
+fn against_object(obstacles: &Obstacles<'_>, solid: &TaperedCapsule, clearance: f32, travel: f32) -> Verdict {
+    let object = obstacles.object;
+    let surface = &object.surface;
+    let lower_bound = surface.gap_lower_bound(solid) - clearance;
+    if lower_bound >= travel {
+        return Verdict::Free;
+    }
+    if lower_bound >= 0.0 && travel > lower_bound + LOOKAHEAD {
+        return Verdict::Undecided;
+    }
+    let search_distance = clearance + travel.min(lower_bound.max(0.0) + LOOKAHEAD);
+    let gap = surface
+        .closest_to_capsule(solid, search_distance)
+        .map_or(search_distance, |gap| gap.gap);
+    let verdict = classify(gap, clearance, travel);
+    // A part that is halved is checked again.
+    if verdict == Verdict::Free && gap < travel && object.is_forbidden_within(solid, travel) {
+        return if travel > RESOLUTION {
+            Verdict::Undecided
+        } else {
+            Verdict::Blocked
+        };
+    }
+    verdict
+}
+
+/// Classifies a part by the distance at its midpoint, which may shrink by `travel` toward the ends.
+fn classify(distance: f32, clearance: f32, travel: f32) -> Verdict {
+    if distance < clearance {
+        Verdict::Blocked
+    } else if distance >= clearance + travel || travel <= RESOLUTION {
+        Verdict::Free
+    } else {
+        Verdict::Undecided
+    }
 }

@@ -35,7 +35,6 @@ const GRIPS_PER_CLOCK_CHECK: usize = 64;
 /// Known grips in the order in which they are tried.
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
-    /// Hands to try before all others.
     preferred: &'a [HandPose],
     atlas: Option<&'a Atlas>,
     /// All grips of the atlas by falling value, the order of the first pass where there are barriers and any valid grasp ends the
@@ -54,42 +53,17 @@ pub(super) struct KnownGrips<'a> {
     cursor: AtomicUsize,
 }
 
-/// A known grip that may be clear of the barriers.
 struct Candidate<'a> {
     source: GraspSource,
     entry: &'a Entry,
     solids: Box<TrackedSolids>,
 }
 
-/// The result of advancing through the known grips.
-enum Next<'a> {
-    /// All have been tried.
-    Exhausted,
-    /// The grips just passed certainly collide with a barrier.
-    AllExcluded,
-    /// The preferred hand with this index.
-    Preferred(usize),
-    /// A grip to check; those passed before it certainly collide.
-    Candidate(Candidate<'a>),
-}
-
-/// The result of trying a known grip.
-pub(super) enum TryResult {
-    /// All have been tried.
-    Exhausted,
-    /// It is not valid.
-    Rejected,
-    /// It is a valid grasp.
-    Valid(GraspSource, Box<Grasp>),
-}
-
 impl<'a> KnownGrips<'a> {
     /// The known grips that a search may use; `None` if there are none.
     pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
         let around = scene.surroundings()?;
-        let GraspContext {
-            object, presented, ..
-        } = around;
+        let (object, presented) = (around.object, around.presented);
         let atlas = settings.known.atlas.as_deref();
         let preferred = &*settings.known.preferred;
         let learned = settings.learned();
@@ -127,12 +101,10 @@ impl<'a> KnownGrips<'a> {
         self.cursor.load(Ordering::Relaxed)
     }
 
-    /// How often all grips of the atlas are passed.
     fn passes(&self) -> usize {
         self.grading.as_ref().map_or(1, |grading| grading.grades().len())
     }
 
-    /// True if the object's owner prefers a region that is free.
     fn wants_region(&self) -> bool {
         let grading = self.grading.as_ref();
         grading.is_some_and(|grading| grading.preference.wants_region)
@@ -146,35 +118,60 @@ impl<'a> KnownGrips<'a> {
         self.learned.map_or(0, |learned| learned.entries().len())
     }
 
-    /// Advances to the next grip that does not certainly collide with a barrier, past at most [`GRIPS_PER_CLOCK_CHECK`] grips.
-    fn next(&self) -> Next<'a> {
+    /// The next grip that is valid, unless `is_over` says first that its time is over. Between two of its calls, at most
+    /// [`GRIPS_PER_CLOCK_CHECK`] grips are skipped that certainly collide with a barrier.
+    pub(super) fn next_valid(
+        &self,
+        gripper: &mut Gripper,
+        is_over: impl Fn() -> bool,
+    ) -> Option<(GraspSource, Box<Grasp>)> {
         let first = self.preferred.len();
         let of_atlas = self.passes() * self.atlas_len();
         let end = first + of_atlas + self.learned_len() * if self.wants_region() { 2 } else { 1 };
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
-        loop {
+        while !is_over() {
             let from = self.cursor.load(Ordering::Relaxed);
             if from >= end {
-                return Next::Exhausted;
+                return None;
             }
-            let mut to = end.min(from + at_once);
-            let mut next = Next::AllExcluded;
-            if from < first {
-                (to, next) = (from + 1, Next::Preferred(from));
-            } else if let Some((place, found)) =
-                (from..to).find_map(|place| Some((place, self.candidate_at(place - first)?)))
+            let preferred = self.preferred.get(from);
+            let mut to = if preferred.is_some() {
+                from + 1
+            } else {
+                end.min(from + at_once)
+            };
+            let mut candidate = None;
+            if preferred.is_none()
+                && let Some((place, found)) =
+                    (from..to).find_map(|place| Some((place, self.candidate_at(place - first)?)))
             {
                 to = place + 1;
-                next = Next::Candidate(found);
+                candidate = Some(found);
             }
-            // If another worker took the same grips meanwhile, this result is dropped.
-            let exchanged = self
+            let taken = self
                 .cursor
                 .compare_exchange(from, to, Ordering::Relaxed, Ordering::Relaxed);
-            if exchanged.is_ok() {
-                return next;
+            if taken.is_err() {
+                // Another worker took the same grips meanwhile.
+                continue;
+            }
+            let valid = if let Some(hand) = preferred {
+                let grasp = self.around.hold_posed(hand, gripper).ok();
+                grasp.map(|grasp| (GraspSource::Preferred(from as u16), grasp))
+            } else {
+                candidate.and_then(
+                    |Candidate {
+                         source,
+                         entry,
+                         solids,
+                     }| { Some((source, self.checker.check(entry, &solids, gripper)?)) },
+                )
+            };
+            if valid.is_some() {
+                return valid;
             }
         }
+        None
     }
 
     /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than those
@@ -254,25 +251,6 @@ impl<'a> KnownGrips<'a> {
             solids,
         })
     }
-
-    /// Tries the next grip.
-    pub(super) fn try_next(&self, gripper: &mut Gripper) -> TryResult {
-        let (source, grasp) = match self.next() {
-            Next::Exhausted => return TryResult::Exhausted,
-            Next::AllExcluded => return TryResult::Rejected,
-            Next::Preferred(index) => {
-                let hand = &self.preferred[index];
-                let source = GraspSource::Preferred(index as u16);
-                (source, self.around.hold_posed(hand, gripper).ok())
-            }
-            Next::Candidate(Candidate {
-                source,
-                entry,
-                solids,
-            }) => (source, self.checker.check(entry, &solids, gripper)),
-        };
-        grasp.map_or(TryResult::Rejected, |grasp| TryResult::Valid(source, grasp))
-    }
 }
 
 /// The quality of a grasp: its score, or its comfort if it has none; for two hands, their mean.
@@ -327,7 +305,6 @@ impl Grading<'_> {
         self.preference.wants_region && !suits_owner(&self.regions.values(contacts))
     }
 
-    /// Whether a grip with this forearm has a grade.
     pub(super) fn fit(&self, grade: Grade, forearm: Vec3, entry: &Entry) -> Fit {
         let suits = self.receiver.suits_forearm(forearm);
         if suits < SUITABLE {
@@ -366,16 +343,17 @@ impl Grading<'_> {
 
     /// The grades that there are, best first: all grips are passed once for each.
     pub(super) fn grades(&self) -> &'static [Grade] {
+        let all = &[
+            Grade::Chosen,
+            Grade::Firm,
+            Grade::Suitable,
+            Grade::Possible,
+            Grade::Valid,
+        ];
         if self.receiver.is_expected() {
-            &[
-                Grade::Chosen,
-                Grade::Firm,
-                Grade::Suitable,
-                Grade::Possible,
-                Grade::Valid,
-            ]
+            all
         } else {
-            &[Grade::Chosen, Grade::Firm, Grade::Suitable]
+            &all[..3]
         }
     }
 }

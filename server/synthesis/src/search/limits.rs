@@ -1,8 +1,5 @@
-//! What keeps one hand from holding an object: conditions that every valid grasp meets, and that this holdout cannot.
-//!
-//! Each is necessary under `PHYSICAL` validity, so that nothing possible is called impossible; only the width is what this search
-//! can open a hand to. They are not sufficient: a search that finds nothing although no limit applies may have had too little
-//! time.
+//! What keeps one hand from holding an object: conditions that every valid grasp meets, and that this holdout cannot. They are not
+//! sufficient: a search that finds nothing although no limit applies may have had too little time.
 
 use std::fmt;
 
@@ -31,10 +28,7 @@ use crate::{
         presented::Presented,
         solids::{PreparedHand, link_radii},
     },
-    propose::{
-        prepared::PreparedRig,
-        surface_pairs::{HoldableSurface, SurfacePair, SurfacePairs},
-    },
+    propose::surface_pairs::{HoldableSurface, SurfacePair, SurfacePairs},
     rating::scoring::middle,
 };
 
@@ -75,14 +69,12 @@ pub struct Limit {
 }
 
 impl Limit {
-    fn unbounded(check: Check, value: f32) -> Self {
-        let bound = None;
+    fn new(check: Check, value: f32, bound: Option<f32>) -> Self {
         Self { check, value, bound }
     }
 
     fn if_exceeded(check: Check, value: f32, bound: f32) -> Option<Self> {
-        let bound = Some(bound);
-        (Some(value) > bound).then_some(Self { check, value, bound })
+        (value > bound).then_some(Self::new(check, value, Some(bound)))
     }
 }
 
@@ -93,30 +85,22 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
         return Vec::new();
     }
     let Task { holdout, object, rig } = task;
-    let holdable = object.holdable();
+    let holdable = &object.holdable;
     let friction = query.friction_on(&holdout.object);
     let span = rig.span();
-    let of_region = |region: OrientedBox| {
-        let reaches = query
-            .requirements
-            .reach
-            .into_iter()
-            .chain(arms_reach(holdout.stance));
-        [
-            torque_limit(holdout, &region, friction, span),
-            giver_limit(&Presented::of(holdout), object.surface_pairs(), rig),
-            reaches
-                .into_iter()
-                .find_map(|reach| reach_limit(reach, &region, rig)),
-        ]
-    };
-    let [torque, giver, reach] = holdable.region.map_or([None; 3], of_region);
+    let region = holdable.region.as_ref();
+    let reaches = query.requirements.reach.into_iter();
+    let mut reaches = reaches.chain(arms_reach(holdout.stance));
     [
         mass_limit(&holdout.object),
-        torque,
-        width_limit(holdable, friction, opening(rig).min(span)),
-        giver,
-        reach,
+        region.and_then(|region| torque_limit(holdout, region, friction, span)),
+        width_limit(
+            holdable,
+            friction,
+            (PALM_OVER_PADS * rig.oppositions().widest()).min(span),
+        ),
+        region.and_then(|_| giver_limit(&Presented::of(holdout), &object.surface_pairs, rig)),
+        region.and_then(|region| reaches.find_map(|reach| reach_limit(reach, region, rig))),
     ]
     .into_iter()
     .flatten()
@@ -137,7 +121,7 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
     let stride = entries.len().div_ceil(MAX_COMPARED).max(1);
     let compared = || entries.iter().step_by(stride);
     let (blocked, all) = if entries.is_empty() {
-        let pairs = object.surface_pairs().pairs();
+        let pairs = &object.surface_pairs.pairs;
         let is_blocked = |pair: &SurfacePair| !pair.is_free_of(obstacles);
         let all_blocked = !obstacles.is_empty() && pairs.iter().all(is_blocked);
         (usize::from(all_blocked && !pairs.is_empty()), 1)
@@ -149,7 +133,7 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
     };
     let share = blocked as f32 / all as f32;
     if share > MOST {
-        return Some(Limit::unbounded(Check::ObstacleClearance, share));
+        return Some(Limit::new(Check::ObstacleClearance, share, None));
     }
     let holds_none = atlas.is_some_and(|atlas| atlas.holding_under(presented.up).is_empty());
     if !holds_none || entries.is_empty() {
@@ -162,13 +146,10 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
             .length()
     };
     let least = entries.iter().map(arm).fold(f32::INFINITY, f32::min);
-    Some(Limit::unbounded(
-        Check::Torque,
-        holdout.object.mass * GRAVITY * least,
-    ))
+    let torque = holdout.object.mass * GRAVITY * least;
+    Some(Limit::new(Check::Torque, torque, None))
 }
 
-/// All contacts push up as hard as they can.
 fn mass_limit(object: &GraspObject) -> Option<Limit> {
     let bound = HAND_FORCE / (GRAVITY * (1.0 - BALANCE_TOLERANCE));
     Limit::if_exceeded(Check::Mass, object.mass, bound)
@@ -184,25 +165,19 @@ fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f3
     Limit::if_exceeded(Check::Torque, weight * arm, bound)
 }
 
-/// How far apart places may be that a hand presses against each other, in metres.
-fn opening(rig: &PreparedRig) -> f32 {
-    PALM_OVER_PADS * rig.oppositions().widest()
-}
-
 /// Contacts that hold have normals more than a right angle apart, at most an opening from each other.
 fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Option<Limit> {
-    let forbidden = Limit::unbounded(Check::Forbidden, holdable.forbidden_share);
+    let forbidden = Limit::new(Check::Forbidden, holdable.forbidden_share, None);
     if holdable.region.is_none() {
         return Some(forbidden);
     }
     let is_wide =
         |width: Option<f32>| width.filter(|&width| width > opening && friction <= MAX_FRICTION_OF_WIDTH);
     is_wide(holdable.width)?;
-    Some(is_wide(holdable.width_of_all).map_or(forbidden, |width| Limit {
-        check: Check::Width,
-        value: width,
-        bound: Some(opening),
-    }))
+    Some(
+        is_wide(holdable.width_of_all)
+            .map_or(forbidden, |width| Limit::new(Check::Width, width, Some(opening))),
+    )
 }
 
 /// The thinnest finger fits nowhere between the object and the giver.
@@ -211,13 +186,13 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
     let digits = Digit::ALL.into_iter().filter(|&digit| rig.has(digit));
     let radii = digits.flat_map(|digit| link_radii(rig, digit));
     let needed = INSIDE_FINGER * radii.fold(f32::INFINITY, f32::min);
-    let sides: &[f32] = if surface.pairs().iter().any(SurfacePair::is_of_sheet) {
+    let sides: &[f32] = if surface.pairs.iter().any(SurfacePair::is_of_sheet) {
         &[1.0, -1.0]
     } else {
         &[1.0]
     };
     let mut room = 0.0_f32;
-    for point in surface.points() {
+    for point in &surface.points {
         for side in sides {
             let above: Vec3 = point.position + point.normal * (side * needed);
             room = room.max(giver.point_distance_upper_bound(above));
@@ -226,11 +201,7 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
             return None;
         }
     }
-    (!surface.points().is_empty()).then_some(Limit {
-        check: Check::GiverClearance,
-        value: room,
-        bound: Some(needed),
-    })
+    (!surface.points.is_empty()).then_some(Limit::new(Check::GiverClearance, room, Some(needed)))
 }
 
 /// The range of a given arm: no wrist is farther from the shoulder than the stretched bones.
@@ -256,13 +227,8 @@ fn reach_limit(reach: Reach, region: &OrientedBox, rig: &Rig) -> Option<Limit> {
 }
 
 /// The distance of a box from the vertical line through a point, in metres; 0 if they meet.
-///
-/// Seen along the line, the box is a polygon.
 fn horizontal_distance(region: &OrientedBox, point: Vec3, up: Vec3) -> f32 {
-    let OrientedBox {
-        object_from_box,
-        half_extents,
-    } = *region;
+    let (object_from_box, half_extents) = (region.object_from_box, region.half_extents);
     let offset = object_from_box.position - point;
     let half_edges = Vec3::AXES.map(|axis| object_from_box.transform_vector(axis) * half_extents.dot(axis));
     let gap = |direction: Vec3| {

@@ -1,7 +1,6 @@
 //! The search: workers run attempts by index until a valid grasp is found, the deadline passes or they are stopped.
 
 pub mod attempt;
-mod both_hands;
 pub mod current;
 pub mod evaluation;
 pub mod key_frames;
@@ -82,57 +81,32 @@ impl Replaceable {
     }
 }
 
-/// The outcome of a look-up of known grips.
-#[derive(Clone, Debug)]
-pub enum LookUp {
-    /// A known grip is valid.
-    Found(Box<SearchOutcome>),
-    /// No valid grip was found in time.
-    NotFound {
-        /// How many were tried or excluded.
-        tried: usize,
-    },
-}
-
-impl LookUp {
-    /// The outcome with a grasp, if there is one.
-    pub fn found(self) -> Option<SearchOutcome> {
-        match self {
-            Self::Found(outcome) => Some(*outcome),
-            Self::NotFound { .. } => None,
-        }
-    }
-}
-
-/// Looks for a valid grip among the known ones in `settings`, for up to `within` and on the calling thread only. If it finds
-/// none, [`find_grasp`] can continue: pass it the number tried in `settings.known.tried`. Applies to searches for the first valid
-/// grasp, not for the best or to reproducible ones.
+/// Looks for a valid grip among the known ones in `settings`, for up to `within` and on the calling thread only. Applies to
+/// searches for the first valid grasp, not for the best or to reproducible ones.
+///
+/// # Errors
+/// If none was valid in time: how many were tried or excluded. With this in `settings.known.tried`, [`find_grasp`] continues.
 pub fn find_known_grasp(
     task: Task<'_>,
     settings: &SearchSettings,
     clock: &dyn Clock,
     within: Duration,
-) -> LookUp {
-    let is_first_valid = settings.query.choice == Choice::FirstValid && !settings.run.reproducible;
-    if !is_first_valid {
-        return LookUp::NotFound { tried: 0 };
+) -> Result<SearchOutcome, usize> {
+    if settings.query.choice != Choice::FirstValid || settings.run.reproducible {
+        return Err(0);
     }
-    let scene = prepare(task, settings);
-    let Some(known) = KnownGrips::of(&scene, settings) else {
-        return LookUp::NotFound { tried: 0 };
-    };
+    let scene = Scene::new(task, settings);
+    let known = KnownGrips::of(&scene, settings).ok_or(0_usize)?;
     let race = Race::new(&scene, settings, Some(&known), clock, Stop::NEVER);
     if race.try_known_until(Some(clock.now() + within)) {
-        LookUp::Found(Box::new(race.outcome()))
-    } else {
-        // A grip that attempts may replace is tried again by the search with those attempts.
-        LookUp::NotFound {
-            tried: known.tried() - usize::from(race.is_beside_region()),
-        }
+        return Ok(race.outcome());
     }
+    // A grip that attempts may replace is tried again by the search with those attempts.
+    Err(known.tried() - usize::from(race.is_beside_region()))
 }
 
-/// Races `settings.run.workers` tasks of `pool` for a valid grasp. Returns when all of them have stopped.
+/// Races `settings.run.workers` tasks of `pool` for a valid grasp. Returns when all of them have stopped. `scene` is prepared with
+/// the same settings, apart from the range of attempts and the known grips.
 ///
 /// Called from a thread of `pool`, that thread is one of the workers; called from elsewhere, it waits.
 ///
@@ -145,21 +119,6 @@ pub fn find_known_grasp(
 /// If an attempt panics. The other workers stop first, and the pool stays usable.
 pub fn find_grasp(
     pool: &rayon::ThreadPool,
-    task: Task<'_>,
-    settings: &SearchSettings,
-    clock: &dyn Clock,
-    stop: Stop<'_>,
-) -> SearchOutcome {
-    find_grasp_in(pool, &prepare(task, settings), settings, clock, stop)
-}
-
-/// [`find_grasp`] in a scene prepared with the same settings, apart from the range of attempts and the known
-/// grips. Further searches reuse what earlier attempts computed about the holdout.
-///
-/// # Panics
-/// As [`find_grasp`].
-pub fn find_grasp_in(
-    pool: &rayon::ThreadPool,
     scene: &Scene<'_>,
     settings: &SearchSettings,
     clock: &dyn Clock,
@@ -171,7 +130,7 @@ pub fn find_grasp_in(
     if race.tries_known_first() {
         return race.outcome();
     }
-    let run = |worker: usize| {
+    let run = &|worker: usize| {
         let stopwatch = if settings.run.record_step_times {
             Stopwatch::new(clock)
         } else {
@@ -179,7 +138,6 @@ pub fn find_grasp_in(
         };
         race.run_worker(worker, stopwatch);
     };
-    let run = &run;
     pool.in_place_scope(|scope| {
         let own = usize::from(pool.current_thread_index().is_some());
         for worker in own..settings.run.workers {
@@ -190,9 +148,4 @@ pub fn find_grasp_in(
         }
     });
     race.outcome()
-}
-
-/// Prepares what all attempts of a search share.
-pub fn prepare<'a>(task: Task<'a>, settings: &SearchSettings) -> Scene<'a> {
-    Scene::new(task, settings)
 }

@@ -16,8 +16,7 @@ use crate::{
     rating::scoring::HELD_BY_HANDLE,
 };
 
-/// Least values of terms without which people would take an object otherwise. With less steadiness, two in three are lost to
-/// pushes as strong as the object's weight in an independent simulation; with more, one in ten.
+/// Least values of terms without which people would take an object otherwise.
 const MIN_OF_FIRM_HAND: [(Term, f32); 1] = [(Term::Steadiness, 0.3)];
 const MIN_OF_CLOSED_HAND: [(Term, f32); 1] = [(Term::EnoughDigits, 0.65)];
 const MIN_OF_FIRM_GRIP: [(Term, f32); 1] = [(Term::OffSharp, 1.0)];
@@ -106,7 +105,7 @@ impl Preference {
 /// True if an object has a region that its owner prefers by so much that contacts elsewhere do not suit, and hands have room
 /// there.
 fn is_preferred_region_free(object: &PreparedObject, barriers: Barriers<'_>) -> bool {
-    let wanted = object.wanted_pairs().pairs();
+    let wanted = &object.wanted_pairs.pairs;
     let compared = wanted
         .iter()
         .step_by(wanted.len().div_ceil(PAIRS_COMPARED).max(1));
@@ -114,13 +113,11 @@ fn is_preferred_region_free(object: &PreparedObject, barriers: Barriers<'_>) -> 
     !wanted.is_empty() && free.count() as f32 >= FREE_SHARE * compared.len() as f32
 }
 
-/// True if no value is below its least.
 fn reach(values: &Values, least: &[(Term, f32)]) -> bool {
     least.iter().all(|&(term, least)| values[term as usize] >= least)
 }
 
-/// Mass in kilograms from which a hand wraps what it holds, where it can: pads alone rarely hold more against pushes. Lighter
-/// things are mostly held in pads.
+/// Mass in kilograms from which a hand wraps what it holds, where it can: pads alone rarely hold more against pushes.
 const WRAPPED_MASS: f32 = 0.15;
 
 /// Mass in kilograms from which people carry things by a handle above them, where there is one.
@@ -151,8 +148,7 @@ pub(super) enum HandleUse {
     Wanted,
 }
 
-/// The turns of eight attempts in a row. Attempts on handles take a tenth of the time of others, and succeed more often, but only
-/// where there is room; with more of them, objects that giver or obstacles cover are found later.
+/// The turns of eight attempts in a row.
 const LIGHT: [Turn; 8] = [
     Anywhere, Anywhere, Anywhere, Anywhere, Anywhere, Anywhere, Anywhere, Hook,
 ];

@@ -13,7 +13,7 @@ use super::{
     Replaceable, SearchEnd, SearchOutcome,
     attempt::Attempt,
     current::{is_at_hand, nearness},
-    known_grips::{KnownGrips, TryResult, grasp_value},
+    known_grips::{KnownGrips, grasp_value},
     report::{FoundGrasp, GraspSource, Record, SearchReport, Tally},
     scene::Scene,
     settings::SearchSettings,
@@ -30,8 +30,7 @@ use crate::{
     physical::grip::Gripper,
 };
 
-/// How long known grips are tried before other workers are woken for fresh attempts. Waking them takes about 50 µs, and nine in
-/// ten requests have their answer by then.
+/// How long known grips are tried before other workers are woken for fresh attempts.
 const HEAD_START: Duration = Duration::from_micros(300);
 
 /// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose it.
@@ -46,13 +45,11 @@ const REGION_ATTEMPTS: u64 = 256;
 /// Marks a worker that is not running an attempt.
 const IDLE: u64 = u64::MAX;
 
-/// The shared state of the workers of one search.
 pub(super) struct Race<'a> {
     scene: &'a Scene<'a>,
     settings: &'a SearchSettings,
     clock: &'a dyn Clock,
     stop: Stop<'a>,
-    /// One past the last attempt.
     end: u64,
     /// The next attempt to start. Indices are taken in order, so all below it are taken.
     next: AtomicU64,
@@ -63,14 +60,12 @@ pub(super) struct Race<'a> {
     settles: AtomicU64,
     /// Set to stop all workers: any grasp will do and one was found, or a worker panicked.
     over: AtomicBool,
-    /// The lowest attempt that was started but interrupted.
     lowest_interrupted: AtomicU64,
     /// The attempt that each worker is running, or a lower index; [`IDLE`] before it starts and after it stops.
     running: Vec<AtomicU64>,
     known: Option<&'a KnownGrips<'a>>,
     /// Set once the best known grip is valid, but not where the object's owner wants hands that have room there.
     is_beside_region: AtomicBool,
-    /// Valid grasps so far.
     candidates: AtomicU64,
     winners: Mutex<Winners>,
     tallies: Mutex<Vec<Tally>>,
@@ -80,7 +75,6 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Stops the other workers if its own worker panics.
 struct PanicGuard<'a>(&'a AtomicBool);
 
 impl Drop for PanicGuard<'_> {
@@ -122,7 +116,6 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Runs attempts until the race is over.
     pub(super) fn run_worker(&self, worker: usize, mut stopwatch: Stopwatch<'_>) {
         let guard = PanicGuard(&self.over);
         let mut tally = Tally::default();
@@ -132,7 +125,7 @@ impl<'a> Race<'a> {
             let mut stream = AttemptStream::new(self.settings.run.seed, index);
             let is_over = || self.is_over_for(index);
             let ended = attempt.run(self.scene, &mut stream, &mut stopwatch, Stop::when(&is_over));
-            let pruned = attempt.pruned_placements();
+            let pruned = attempt.pruned_placements;
             let rejection = match ended {
                 Err(Failure::Stopped) => {
                     self.lowest_interrupted.fetch_min(index, Ordering::SeqCst);
@@ -183,7 +176,6 @@ impl<'a> Race<'a> {
         (index < self.end).then_some(index)
     }
 
-    /// True if an attempt need not run to its end.
     fn is_over_for(&self, index: u64) -> bool {
         self.over.load(Ordering::Relaxed)
             || self.bound.load(Ordering::Relaxed) < index
@@ -191,7 +183,6 @@ impl<'a> Race<'a> {
             || self.end_time().is_some_and(|end| self.clock.now() >= end)
     }
 
-    /// When the search ends by its clock.
     fn end_time(&self) -> Option<Duration> {
         let settled = self.settles.load(Ordering::Relaxed);
         let settled = (settled != u64::MAX).then(|| Duration::from_nanos(settled));
@@ -200,14 +191,11 @@ impl<'a> Race<'a> {
 
     /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search is reproducible.
     pub(super) fn tries_known_first(&self) -> bool {
-        if self.known.is_none() {
+        if self.known.is_none() || self.settings.query.choice == Choice::BestWithinBudget {
             return false;
         }
-        match (self.settings.query.choice, self.settings.run.reproducible) {
-            (Choice::BestWithinBudget, _) => false,
-            (Choice::FirstValid, true) => self.try_known_until(None),
-            (Choice::FirstValid, false) => self.try_known_until(Some(self.clock.now() + HEAD_START)),
-        }
+        let is_reproducible = self.settings.run.reproducible;
+        self.try_known_until((!is_reproducible).then(|| self.clock.now() + HEAD_START))
     }
 
     /// True if the best known grip is valid, but attempts may replace it.
@@ -235,15 +223,8 @@ impl<'a> Race<'a> {
         gripper: &mut Gripper,
         is_late: impl Fn() -> bool,
     ) -> Option<(GraspSource, Box<Grasp>)> {
-        let known = self.known?;
-        while !self.is_over_for(0) && !is_late() {
-            match known.try_next(gripper) {
-                TryResult::Exhausted => return None,
-                TryResult::Rejected => {}
-                TryResult::Valid(source, grasp) => return Some((source, grasp)),
-            }
-        }
-        None
+        self.known?
+            .next_valid(gripper, || self.is_over_for(0) || is_late())
     }
 
     /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the best grasp is
@@ -262,22 +243,20 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Records a valid grasp.
     fn record_valid(&self, source: GraspSource, grasp: Box<Grasp>, value: f32, is_chosen: bool) {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let goes_on = self.show(source, &grasp, value);
         let is_reproducible = self.settings.run.reproducible;
         let (refinement, attempts) = self.refinement_of(&grasp);
-        let mut winner = Winner {
+        // A known grip precedes all attempts.
+        let first = self.settings.run.first_attempt;
+        let next = source.attempt().map_or(first, |index| index.saturating_add(1));
+        let winner = Winner {
             source,
             grasp,
             value,
-            last_replacing: 0,
+            last_replacing: next.saturating_add(attempts - 1),
         };
-        // A known grip precedes all attempts.
-        let after = |index: u64| index.saturating_add(1);
-        let next = winner.index().map_or(self.settings.run.first_attempt, after);
-        winner.last_replacing = next.saturating_add(attempts - 1);
         let mut winners = lock(&self.winners);
         let rival = &mut winners.chosen;
         let is_preferred = match (self.settings.query.choice, source) {
@@ -306,7 +285,7 @@ impl<'a> Race<'a> {
                 // A known grip precedes every attempt.
                 rival
                     .as_ref()
-                    .is_none_or(|lowest| lowest.index().is_some_and(|lowest| index < lowest))
+                    .is_none_or(|lowest| lowest.source.attempt().is_some_and(|lowest| index < lowest))
             }
             (Choice::FirstValid, _) => {
                 self.over.store(true, Ordering::Relaxed);
@@ -384,30 +363,29 @@ impl<'a> Race<'a> {
         Some(before.min(self.bound.load(Ordering::SeqCst)))
     }
 
-    /// The outcome, after all workers have stopped.
     pub(super) fn outcome(self) -> SearchOutcome {
         let interrupted = self.lowest_interrupted.into_inner();
         let is_reproducible = self.settings.run.reproducible;
         let winners = self.winners.into_inner().unwrap_or_else(PoisonError::into_inner);
         let (winner, replaceable_until) = winners.decided(is_reproducible);
-        let replaceable_until = match replaceable_until {
-            Some(last) if is_reproducible => Some(Replaceable::UntilAttempt(last)),
-            Some(_) => Some(Replaceable::UntilTime(Duration::from_nanos(
-                self.settles.into_inner(),
-            ))),
-            None => None,
-        };
+        let settles = Duration::from_nanos(self.settles.into_inner());
+        let replaceable_until = replaceable_until.map(|last| {
+            if is_reproducible {
+                Replaceable::UntilAttempt(last)
+            } else {
+                Replaceable::UntilTime(settles)
+            }
+        });
         // Reproducible: an interrupted attempt with a lower index, or one that replaces the winner, might have won.
         let last_deciding = match replaceable_until {
             Some(Replaceable::UntilAttempt(last)) => Some(last),
-            _ => winner.as_ref().and_then(Winner::index),
+            _ => winner.as_ref().and_then(|winner| winner.source.attempt()),
         };
-        let winner =
+        let mut winner =
             winner.filter(|_| !is_reproducible || last_deciding.is_none_or(|index| index < interrupted));
-        let winner = winner.map(|mut winner| {
+        if let Some(winner) = &mut winner {
             self.scene.pose_arm(&mut winner.grasp);
-            winner
-        });
+        }
         let source = winner.as_ref().map(|winner| winner.source);
         let end = if winner.is_some() {
             SearchEnd::Found
@@ -445,7 +423,6 @@ impl<'a> Race<'a> {
     }
 }
 
-/// A valid grasp.
 struct Winner {
     source: GraspSource,
     grasp: Box<Grasp>,
@@ -459,15 +436,7 @@ struct Winner {
 struct Winners {
     /// The best, the first, or the one with the lowest index that a person would choose.
     chosen: Option<Winner>,
-    /// Those that a person would not choose.
     others: Vec<Winner>,
-}
-
-impl Winner {
-    /// The index of the attempt that found it; `None` for known grips.
-    fn index(&self) -> Option<u64> {
-        self.source.attempt()
-    }
 }
 
 impl Winners {
@@ -477,13 +446,17 @@ impl Winners {
         let Self { chosen, others } = self;
         let last = others.iter().map(|other| other.last_replacing).min();
         // Beyond the last, attempts may have run that need not have.
-        let counts = |winner: &Winner| !is_reproducible || winner.index() <= last;
+        let counts = |winner: &Winner| !is_reproducible || winner.source.attempt() <= last;
         if let Some(chosen) = chosen
             && (last.is_none() || counts(&chosen))
         {
             return (Some(chosen), None);
         }
-        let better = |a: &Winner, b: &Winner| a.value.total_cmp(&b.value).then(b.index().cmp(&a.index()));
+        let better = |a: &Winner, b: &Winner| {
+            a.value
+                .total_cmp(&b.value)
+                .then(b.source.attempt().cmp(&a.source.attempt()))
+        };
         (others.into_iter().filter(counts).max_by(better), last)
     }
 }

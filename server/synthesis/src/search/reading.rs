@@ -1,9 +1,5 @@
-//! A hand that no search closed, as it is checked: the one place where current grasps and clients' own are measured.
-//!
-//! A current grasp fails by the first check that fails ([`super::current`]), while verdicts need all of them
-//! ([`super::verdicts`]). Both take figures, bounds and decisions from here. The bounds are those of the searches' own checks,
-//! and the figures come from the functions that these decide by. Whatever takes long to measure has a test that says sooner that
-//! a hand is certainly clear.
+//! A hand that no search closed, as it is checked: current grasps, which fail by the first check that fails ([`super::current`]), and
+//! clients' own, of which verdicts need all checks ([`super::verdicts`]). Bounds and functions are those of the searches' own checks.
 
 use glam::Vec3;
 
@@ -16,19 +12,10 @@ use crate::{
         holdout::{ArmPose, Holdout},
     },
     physical::{
-        barriers::{
-            Barrier, BarrierClearances, Nearest, OBSTACLE_CLEARANCE, nearest_hand, nearest_obstacle,
-            skin_toward_solid,
-        },
-        grip::{
-            FEWEST_CONTACTS, FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, PosedHold,
-            clear_of_barriers,
-        },
+        barriers::{Barrier, BarrierClearances, Nearest, OBSTACLE_CLEARANCE},
+        grip::{FEWEST_CONTACTS, GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, PosedHold},
         immobility::{BALANCE_TOLERANCE, Balance},
-        solids::{
-            HandSolids, NearestParts, SOFT_CONTACT, SolidPart, TaperedCapsule, TrackedSolids, closest,
-            self_clearance,
-        },
+        solids::{HandSolids, SolidPart, TaperedCapsule, TrackedSolids, closest},
     },
     rating::{
         assessment::{GraspContext, unscored_grasp},
@@ -39,10 +26,6 @@ use crate::{
 /// By how much, in metres, distances may fall short of their bounds: a grasp that was valid loses so much to single precision on
 /// its way through a client's frame.
 const ROUNDING: f32 = 5e-6;
-
-/// How much closer than measured a forbidden surface may be, in metres; see
-/// [`crate::geometry::mesh_bvh::MeshBvh::closest_to_capsule`].
-const GAP_SLACK: f32 = 2e-5;
 
 /// A figure, its bound, and whether it keeps that.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,23 +60,12 @@ pub(super) struct NearestPart {
     pub(super) at: Vec3,
 }
 
-/// The two parts of a hand that can meet and come closest.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ClosestParts {
-    /// The one part, and a point of its skin; negative where they overlap more than at rest.
-    pub(super) nearest: NearestPart,
-    pub(super) other: SolidPart,
-    /// How deep they overlap at rest, in metres.
-    pub(super) rest_overlap: f32,
-}
-
-/// A posed hand and everything that it is checked against.
 pub(super) struct Reading<'a> {
     pub(super) around: GraspContext<'a>,
     pub(super) pose: &'a HandPose,
     pub(super) solids: HandSolids,
-    holdout: &'a Holdout,
-    tracked: TrackedSolids,
+    pub(super) holdout: &'a Holdout,
+    pub(super) tracked: TrackedSolids,
 }
 
 impl<'a> Reading<'a> {
@@ -107,21 +79,6 @@ impl<'a> Reading<'a> {
             solids,
             holdout,
         }
-    }
-
-    /// The distances from barriers, if all of them are certainly kept.
-    pub(super) fn if_clear_of_barriers(&self) -> Option<BarrierClearances> {
-        clear_of_barriers(&self.tracked, self.around.presented.barriers())
-    }
-
-    /// The nearest of the other people's hands; `None` without any.
-    pub(super) fn nearest_hand(&self) -> Option<Nearest> {
-        nearest_hand(&self.tracked, self.holdout, self.around.presented)
-    }
-
-    /// The nearest obstacle; `None` without any.
-    pub(super) fn nearest_obstacle(&self) -> Option<Nearest> {
-        nearest_obstacle(&self.tracked, self.around.presented)
     }
 
     /// The deepest part in the object; `None` if no part is in it.
@@ -161,37 +118,6 @@ impl<'a> Reading<'a> {
         Ok(nearest)
     }
 
-    /// True only if no part of the hand goes through another.
-    pub(super) fn is_clear_of_itself(&self) -> bool {
-        self_clearance(self.around.rig, &self.solids) >= 0.0
-    }
-
-    /// The closest parts that can meet; `None` if none can.
-    pub(super) fn closest_parts(&self) -> Option<ClosestParts> {
-        let NearestParts {
-            clearance,
-            rest_overlap,
-            parts: [(part, our), (other, their)],
-        } = NearestParts::of(self.around.rig, &self.solids)?;
-        let nearest = NearestPart {
-            distance: clearance - SOFT_CONTACT,
-            part,
-            at: skin_toward_solid(&our, &their),
-        };
-        Some(ClosestParts {
-            nearest,
-            other,
-            rest_overlap,
-        })
-    }
-
-    /// True only if the hand keeps off forbidden surfaces.
-    pub(super) fn is_clear_of_forbidden(&self) -> bool {
-        let object = self.around.object.object;
-        let mut parts = self.solids.iter();
-        !parts.any(|part| object.is_forbidden_within(part, FORBIDDEN_CLEARANCE + GAP_SLACK))
-    }
-
     /// The receiver's arm; `None` if where the receiver stands is unknown, or if the arm does not reach the wrist.
     pub(super) fn arm(&self) -> Option<ArmPose> {
         let around = &self.around;
@@ -223,7 +149,6 @@ pub(super) fn depth(deepest: Option<&NearestPart>) -> Measure {
     Measure::new(depth, MAX_PENETRATION, depth <= MAX_PENETRATION + ROUNDING)
 }
 
-/// The distance from a barrier.
 pub(super) fn clearance(nearest: &Nearest) -> Measure {
     let bound = match nearest.barrier {
         Barrier::PresentingHand | Barrier::OtherHand(_) => GIVER_CLEARANCE,
@@ -232,7 +157,6 @@ pub(super) fn clearance(nearest: &Nearest) -> Measure {
     Measure::at_least(nearest.distance, bound)
 }
 
-/// A posed hand with its contacts.
 pub(super) struct Held<'a> {
     pub(super) hold: PosedHold,
     pub(super) contacts: &'a [Contact],
@@ -242,18 +166,14 @@ pub(super) struct Held<'a> {
 impl Reading<'_> {
     /// How the hand holds the object, whatever it collides with. Something hangs in it only if the requirements admit that.
     pub(super) fn held<'b>(&'b self, gripper: &'b mut Gripper) -> Held<'b> {
-        let GraspContext {
-            object,
-            presented,
-            rig,
-            requirements,
-        } = self.around;
+        let around = &self.around;
+        let requirements = around.requirements;
         let may_hang = |contacts: &[Contact], balance: &Balance| {
             requirements.admits_type(Some(GraspType::FixedHook))
                 && requirements.admits_comfort(comfort_of(contacts, balance))
         };
         Held {
-            hold: gripper.hold_as_posed(&object, rig, self.pose, presented, may_hang),
+            hold: gripper.hold_as_posed(&around.object, around.rig, self.pose, around.presented, may_hang),
             contacts: &gripper.contacts,
             reading: self,
         }
@@ -261,7 +181,6 @@ impl Reading<'_> {
 }
 
 impl Held<'_> {
-    /// The number of contacts.
     pub(super) fn contacts(&self) -> Measure {
         let count = self.contacts.len();
         Measure::new(count as f32, FEWEST_CONTACTS as f32, count >= FEWEST_CONTACTS)
@@ -273,19 +192,16 @@ impl Held<'_> {
         Measure::new(residual, BALANCE_TOLERANCE, residual <= BALANCE_TOLERANCE)
     }
 
-    /// The type of the hand.
     pub(super) fn classification(&self) -> Classification {
         let Reading { around, pose, .. } = self.reading;
         around.classification(pose, self.contacts, self.hold.hangs())
     }
 
-    /// True if the requirements admit the comfort of the forces.
     pub(super) fn is_comfort_admitted(&self) -> bool {
         let comfort = comfort_of(self.contacts, &self.hold.balance);
         self.reading.around.requirements.admits_comfort(comfort)
     }
 
-    /// The hand as a grasp of this type, without a score.
     pub(super) fn grasp(
         &self,
         classification: Classification,
@@ -316,7 +232,6 @@ impl Held<'_> {
         }
     }
 
-    /// A grasp from [`Self::grasp`] with its score.
     pub(super) fn scored(&self, grasp: Grasp) -> Grasp {
         let Reading { around, solids, .. } = self.reading;
         around.scored(grasp, self.hold.relative_closure, solids)

@@ -8,6 +8,7 @@ use super::limits::Limit;
 use crate::{
     base::{rejection::Rejection, stopwatch::StepTimes},
     geometry::boxes::Aabb,
+    known::entry::nearest_axis,
     model::{
         grasp::{Contact, Grasp},
         grasp_type::GraspType,
@@ -113,19 +114,19 @@ impl SearchReport {
     }
 }
 
-/// Where a grasp came from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Where a grasp came from, in the order in which sources are tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum GraspSource {
-    /// A fresh attempt, by index.
-    Attempt(u64),
+    /// A preferred hand, by index.
+    Preferred(u16),
     /// A grip of the atlas, by index.
     Atlas(u16),
     /// A grip that an earlier search found, by index.
     Learned(u16),
     /// The current grasp, as it is or with digits moved out of the way.
     Current,
-    /// A preferred hand, by index.
-    Preferred(u16),
+    /// A fresh attempt, by index.
+    Attempt(u64),
 }
 
 impl GraspSource {
@@ -180,18 +181,7 @@ impl FoundGrasp {
         let (this, that) = (self.source, other.source);
         let by_value = self.value.total_cmp(&other.value);
         let by_rank = this.is_preferred().cmp(&that.is_preferred());
-        by_rank.then(by_value).then(order(that).cmp(&order(this)))
-    }
-}
-
-/// The order in which sources are tried.
-fn order(source: GraspSource) -> (u8, u64) {
-    match source {
-        GraspSource::Preferred(index) => (0, u64::from(index)),
-        GraspSource::Atlas(index) => (1, u64::from(index)),
-        GraspSource::Learned(index) => (2, u64::from(index)),
-        GraspSource::Current => (3, 0),
-        GraspSource::Attempt(index) => (4, index),
+        by_rank.then(by_value).then(that.cmp(&this))
     }
 }
 
@@ -201,9 +191,7 @@ const SETTLE_INTERVAL: usize = 4096;
 /// A completed attempt.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Record {
-    /// Its index.
     pub(super) attempt: u64,
-    /// Number of placements it pruned.
     pub(super) pruned: u64,
     /// Why it failed; `None` if it was valid.
     pub(super) rejection: Option<Rejection>,
@@ -213,9 +201,7 @@ pub(super) struct Record {
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     pub(super) report: SearchReport,
-    /// Attempts that count only if no earlier attempt is valid.
     unsettled: Vec<Record>,
-    /// Placements pruned by an interrupted attempt.
     pub(super) interrupted_prunes: u64,
 }
 
@@ -230,7 +216,6 @@ impl Tally {
         }
     }
 
-    /// Counts the kept attempts up to index `last`.
     fn settle(&mut self, last: u64) {
         // A worker's indices ascend.
         let settled = self.unsettled.partition_point(|record| record.attempt <= last);
@@ -267,21 +252,12 @@ pub struct Differences {
 /// What all grasps of a class have in common, as far as it counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Class {
-    /// The side that the hand comes from, and the hand.
-    pub approach: Option<(Side, Handedness)>,
+    /// The side that the palm faces away from most, 0 to 5 for x, -x, y, -y, z, -z, and the hand.
+    pub approach: Option<(u8, Handedness)>,
     /// The type; the inner none for a grasp without a type.
     pub grasp_type: Option<Option<GraspType>>,
     /// The part that is held.
     pub region: Option<Part>,
-}
-
-/// A direction of the object's axes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Side {
-    /// Which axis: 0 to 2.
-    pub axis: u8,
-    /// True for the direction against it.
-    pub is_negative: bool,
 }
 
 /// A part of an object.
@@ -297,20 +273,13 @@ impl Class {
     /// The class of a grasp on an object.
     pub fn of(grasp: &Grasp, handedness: Handedness, object: &GraspObject, by: Differences) -> Self {
         Self {
-            approach: by.approach.then(|| (side_of(grasp), handedness)),
+            approach: by.approach.then(|| {
+                let away = grasp.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
+                (nearest_axis(away), handedness)
+            }),
             grasp_type: by.grasp_type.then_some(grasp.classification.grasp_type),
             region: by.region.then(|| part_of(&grasp.contacts, object)),
         }
-    }
-}
-
-/// The direction that the palm faces away from most. Of several, the first axis.
-fn side_of(grasp: &Grasp) -> Side {
-    let away = grasp.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
-    let axis = away.abs().max_position();
-    Side {
-        axis: axis as u8,
-        is_negative: away[axis] < 0.0,
     }
 }
 
@@ -330,7 +299,7 @@ fn part_of(contacts: &[Contact], object: &GraspObject) -> Part {
 pub struct Alternatives {
     most: usize,
     /// The best of each class, best first.
-    best: Vec<Alternative>,
+    pub best: Vec<Alternative>,
 }
 
 /// The best grasp of its class.
@@ -385,9 +354,65 @@ impl Alternatives {
         self.best.insert(place, new);
         self.best.truncate(self.most);
     }
+}
 
-    /// The grasps, best first.
-    pub fn into_best(self) -> Vec<Alternative> {
-        self.best
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{base::pose::Pose, model::hand::DigitAngles};
+
+    fn miss(rejection: Rejection, wrench_angle: Option<f32>, attempt: u64) -> NearestMiss {
+        NearestMiss {
+            rejection,
+            attempt,
+            wrench_angle,
+            pose: HandPose {
+                frame_from_wrist: Pose::IDENTITY,
+                digits: [DigitAngles::default(); 5],
+            },
+        }
+    }
+
+    fn part(nearest_miss: Option<NearestMiss>) -> SearchReport {
+        SearchReport {
+            attempts: 5,
+            pruned_placements: 7,
+            rejections: [1, 0, 0, 0, 0, 0, 0, 4, 0],
+            step_times: Some([0, 3, 0, 0, 0].map(Duration::from_micros)),
+            nearest_miss,
+            candidates: 2,
+            ..SearchReport::default()
+        }
+    }
+
+    #[test]
+    fn merge_adds_counts_and_keeps_the_nearest_miss_and_the_better_source() {
+        let mut total = SearchReport::default();
+        for nearest_miss in [
+            Some(miss(Rejection::NotImmobilizing, Some(0.4), 3)),
+            Some(miss(Rejection::PalmCollision, None, 8)),
+            Some(miss(Rejection::NotImmobilizing, Some(0.2), 12)),
+            None,
+        ] {
+            total.merge(part(nearest_miss), false);
+        }
+        let expected = SearchReport {
+            attempts: 20,
+            pruned_placements: 28,
+            rejections: [4, 0, 0, 0, 0, 0, 0, 16, 0],
+            step_times: Some([0, 12, 0, 0, 0].map(Duration::from_micros)),
+            nearest_miss: Some(miss(Rejection::NotImmobilizing, Some(0.2), 12)),
+            candidates: 8,
+            ..SearchReport::default()
+        };
+        assert_eq!(total, expected);
+        let mut better = SearchReport {
+            source: Some(GraspSource::Current),
+            ..SearchReport::default()
+        };
+        better.merge(total.clone(), false);
+        assert_eq!(better.source, Some(GraspSource::Current));
+        total.merge(better, true);
+        assert_eq!(total.source, Some(GraspSource::Current));
     }
 }

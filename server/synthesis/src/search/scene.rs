@@ -55,7 +55,6 @@ pub struct Task<'a> {
 /// A hand as `GUIDED` search proposes it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guided {
-    /// The hand.
     pub(super) proposal: Proposal,
     /// Whether it wraps a handle or hooks in: such hands succeed so often, and fail so soon, that others from seeds need not
     /// follow.
@@ -70,9 +69,7 @@ pub struct Scene<'a> {
     /// Strategy, friction and what Algorithm 1 derives from them.
     pub(super) thesis: ThesisScene<'a>,
     object: ObjectScene<'a>,
-    /// How the object is presented, under `PHYSICAL` validity.
     presented: Option<Presented>,
-    /// Seeds of attempts, under `GUIDED` and `PHYSICAL`.
     pub(super) seeds: SeedSets,
     // Computed on first use: cached placements of the receiving hand, where the object may hang in hooked fingers, the
     // preference among grasps, and where other people's hands were lately.
@@ -136,18 +133,15 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The grasp to hold on to.
     pub(super) fn current(&self) -> Option<&CurrentGrasp> {
         self.query.current.as_ref()
     }
 
-    /// Where other people's hands were lately, if that is known.
     pub(super) fn recent_hands(&self) -> Option<&RecentHands> {
         let hands = &self.query.recent_hands;
         (!hands.is_empty()).then(|| self.recent_hands.get_or_init(|| RecentHands::of(hands)))
     }
 
-    /// What a person would choose.
     pub(super) fn preference(&self) -> Preference {
         *self
             .preference
@@ -165,7 +159,7 @@ impl<'a> Scene<'a> {
         let Task { object, .. } = self.task;
         ProposalContext {
             object: object.object(),
-            surface: object.surface_pairs(),
+            surface: &object.surface_pairs,
             barriers: self.barriers(),
             // Two hands carry from below and at the ends.
             chooses: self
@@ -178,9 +172,6 @@ impl<'a> Scene<'a> {
     }
 
     /// A hand proposed by `GUIDED` search, with the palm settled on its target.
-    ///
-    /// # Errors
-    /// The object offers no placement, or the stop came.
     pub(super) fn guided_proposal(
         &self,
         stream: &mut AttemptStream,
@@ -263,13 +254,12 @@ impl<'a> Scene<'a> {
         Some(there.perturbed_about(pivot, NEAR_HAND, &mut stream.clone()))
     }
 
-    /// Where the object may hang in hooked fingers.
     fn hanging_places(&self, presented: &Presented, stop: Stop<'_>) -> Result<&HangingPlaces, Stopped> {
         if let Some(places) = self.hanging_places.get() {
             return Ok(places);
         }
         let object = self.task.object;
-        let probed = HangingPlaces::of(object.object(), object.surface_pairs(), presented.up, stop)?;
+        let probed = HangingPlaces::of(object.object(), &object.surface_pairs, presented.up, stop)?;
         Ok(self.hanging_places.get_or_init(|| probed))
     }
 }

@@ -93,7 +93,6 @@ impl Query {
         self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
     }
 
-    /// The context in which hands are assessed.
     pub(super) fn around<'a>(
         &'a self,
         holdout: &'a Holdout,
@@ -127,7 +126,7 @@ pub struct Known {
     pub seeds: SeedSource,
     /// Hands in the object's frame that are tried before all other known grips, likewise.
     pub preferred: Arc<[HandPose]>,
-    /// Number of known grips to skip, from [`super::LookUp::NotFound`] for the same ones.
+    /// Number of known grips to skip, from [`super::find_known_grasp`] for the same ones.
     pub tried: usize,
 }
 

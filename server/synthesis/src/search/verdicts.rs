@@ -1,14 +1,11 @@
-//! What is right and wrong with a hand that somebody posed: every check of `PHYSICAL` validity with its figure.
-//!
-//! Searches stop at the first check that fails, and mostly without knowing by how much. Here every check is made and put into
-//! words.
+//! Verdicts about a hand that somebody posed: every check of `PHYSICAL` validity with its figure, in words.
 
 use std::fmt::{self, Write as _};
 
 use glam::Vec3;
 
 use super::{
-    reading::{self, ClosestParts, Held, Measure, NearestPart, Reading, depth},
+    reading::{self, Held, Measure, NearestPart, Reading, depth},
     scene::Task,
     settings::Query,
 };
@@ -23,10 +20,10 @@ use crate::{
         requirements::Check,
     },
     physical::{
-        barriers::{Barrier, BarrierClearances, Nearest},
+        barriers::{Barrier, BarrierClearances, Nearest, nearest_hand, nearest_obstacle, skin_toward_solid},
         grip::{FEWEST_CONTACTS, FORBIDDEN_CLEARANCE, Gripper, PosedHold},
         presented::Presented,
-        solids::{HandSolids, SOFT_CONTACT, SolidPart},
+        solids::{HandSolids, NearestParts, SOFT_CONTACT, SolidPart},
     },
 };
 
@@ -97,9 +94,9 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
     let held = reading.held(&mut gripper);
     stop.check()?;
     let deepest = reading.deepest(stop)?;
-    let hand = reading.nearest_hand();
+    let hand = nearest_hand(&reading.tracked, holdout, &presented);
     stop.check()?;
-    let obstacle = reading.nearest_obstacle();
+    let obstacle = nearest_obstacle(&reading.tracked, &presented);
     let arm = reading.arm();
     let grasp = held.grasp(
         held.classification(),
@@ -110,19 +107,25 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
         },
         arm,
     );
+    let is_not_banned = reading.around.is_not_banned(pose.frame_from_wrist);
+    let of_banned = if is_not_banned {
+        "it is not near a forbidden grip"
+    } else {
+        "it is near a forbidden grip of the object"
+    };
     let verdicts = vec![
         joint_limits(rig, pose, &reading.solids),
         penetration(deepest),
         clearance(Check::GiverClearance, hand),
         clearance(Check::ObstacleClearance, obstacle),
-        self_collision(reading.closest_parts()),
+        self_collision(NearestParts::of(rig, &reading.solids)),
         contacts(&held),
         forbidden(reading.nearest_forbidden()),
         closure(&held.hold),
         balance(&held),
         reach(&reading, reading.reach(arm.as_ref())),
         requirements(&reading, &held),
-        banned(reading.around.is_not_banned(pose.frame_from_wrist)),
+        Verdict::new(Check::Banned, is_not_banned, of_banned),
     ];
     let mut judgement = Judgement { verdicts, grasp };
     if judgement.is_valid() {
@@ -156,7 +159,6 @@ impl Verdict {
         }
     }
 
-    /// With where it was measured.
     fn of(self, part: SolidPart, at: Vec3, against: Option<Against>) -> Self {
         Self {
             at: Some(at),
@@ -167,16 +169,13 @@ impl Verdict {
     }
 }
 
-fn self_collision(parts: Option<ClosestParts>) -> Verdict {
+fn self_collision(parts: Option<NearestParts>) -> Verdict {
     let check = Check::SelfCollision;
     let Some(parts) = parts else {
         return Verdict::new(check, true, "no parts of the hand can meet");
     };
-    let ClosestParts {
-        nearest: NearestPart { distance, part, at },
-        other,
-        rest_overlap,
-    } = parts;
+    let [(part, ours), (other, theirs)] = parts.parts;
+    let (distance, rest_overlap) = (parts.clearance - SOFT_CONTACT, parts.rest_overlap);
     let depth = millimetres(-distance);
     let place = if distance < 0.0 && rest_overlap > 0.0 {
         format!("presses {depth} deeper than at rest into")
@@ -188,7 +187,11 @@ fn self_collision(parts: Option<ClosestParts>) -> Verdict {
     let yields = millimetres(SOFT_CONTACT);
     let description = format!("the {part} {place} the {other}; both yield by {yields}");
     let measure = Measure::at_least(distance, -SOFT_CONTACT);
-    Verdict::measured(check, measure, description).of(part, at, Some(Against::Part(other)))
+    Verdict::measured(check, measure, description).of(
+        part,
+        skin_toward_solid(&ours, &theirs),
+        Some(Against::Part(other)),
+    )
 }
 
 fn forbidden(nearest: Option<NearestPart>) -> Verdict {
@@ -246,17 +249,12 @@ fn clearance(check: Check, nearest: Option<Nearest>) -> Verdict {
     let Some(nearest) = nearest else {
         return Verdict::new(check, true, "there is nothing to keep clear of");
     };
-    let Nearest {
-        distance,
-        part,
-        at,
-        barrier,
-    } = nearest;
+    let (part, barrier) = (nearest.part, nearest.barrier);
     let measure = reading::clearance(&nearest);
-    let place = place(distance, "inside");
+    let place = place(nearest.distance, "inside");
     let least = millimetres(measure.bound);
     let description = format!("the {part} is {place} {barrier}; it must keep {least}");
-    Verdict::measured(check, measure, description).of(part, at, Some(Against::Barrier(barrier)))
+    Verdict::measured(check, measure, description).of(part, nearest.at, Some(Against::Barrier(barrier)))
 }
 
 fn contacts(held: &Held<'_>) -> Verdict {
@@ -340,80 +338,37 @@ fn requirements(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
     Verdict::new(Check::Requirements, unmet.is_empty(), description)
 }
 
-fn banned(is_not_banned: bool) -> Verdict {
-    let description = if is_not_banned {
-        "it is not near a forbidden grip"
-    } else {
-        "it is near a forbidden grip of the object"
-    };
-    Verdict::new(Check::Banned, is_not_banned, description)
-}
-
-/// An angle of a hand.
-struct Angle {
-    digit: Digit,
-    phalanx: Phalanx,
-    name: &'static str,
-    value: f32,
-    range: AngleRange,
-}
-
-impl Angle {
-    /// How far it is beyond its limits, in radians.
-    fn excess(&self) -> f32 {
-        (self.range.min - self.value)
-            .max(self.value - self.range.max)
-            .max(0.0)
-    }
-}
-
 /// The largest excess of the hand's angles: searches keep the limits as they bend digits, and requests with current grasps are
 /// refused.
 fn joint_limits(rig: &Rig, pose: &HandPose, solids: &HandSolids) -> Verdict {
     let digits = Digit::ALL.into_iter().filter(|&digit| rig.has(digit));
-    let all = digits.flat_map(|digit| {
+    let angles = digits.flat_map(|digit| {
         let (limits, angles) = (&rig.digit(digit).limits, pose.digits[digit.index()]);
-        let angle = |phalanx, name, value, range| Angle {
-            digit,
-            phalanx,
-            name,
-            value,
-            range,
-        };
+        let [first, second, third] = Phalanx::ALL;
         [
-            angle(Phalanx::First, "base_yaw", angles.base_yaw, limits.base_yaw),
-            angle(Phalanx::First, "base_pitch", angles.base_pitch, limits.base_pitch),
-            angle(
-                Phalanx::Second,
-                "second_pitch",
-                angles.second_pitch,
-                limits.second_pitch,
-            ),
-            angle(
-                Phalanx::Third,
-                "third_pitch",
-                angles.third_pitch,
-                limits.third_pitch,
-            ),
+            (first, "base_yaw", angles.base_yaw, limits.base_yaw),
+            (first, "base_pitch", angles.base_pitch, limits.base_pitch),
+            (second, "second_pitch", angles.second_pitch, limits.second_pitch),
+            (third, "third_pitch", angles.third_pitch, limits.third_pitch),
         ]
+        .map(|(phalanx, name, angle, AngleRange { min, max })| {
+            let excess = (min - angle).max(angle - max).max(0.0);
+            (excess, digit, phalanx, move |part: SolidPart| {
+                format!("{name} of the {part} is {angle:.3} rad; its limits are {min:.3} and {max:.3} rad")
+            })
+        })
     });
-    let Some(worst) = all.max_by(|a, b| a.excess().total_cmp(&b.excess())) else {
+    let Some((excess, digit, phalanx, describe)) = angles.max_by(|a, b| a.0.total_cmp(&b.0)) else {
         return Verdict::new(Check::JointLimits, true, "the hand has no digits");
     };
-    let part = SolidPart::Phalanx(worst.digit, worst.phalanx);
-    let measure = Measure::new(worst.excess(), ANGLE_SLACK, worst.excess() <= ANGLE_SLACK);
+    let part = SolidPart::Phalanx(digit, phalanx);
+    let measure = Measure::new(excess, ANGLE_SLACK, excess <= ANGLE_SLACK);
     let description = if measure.passed {
         "every angle is within its limits".to_owned()
     } else {
-        let Angle {
-            name,
-            value,
-            range: AngleRange { min, max },
-            ..
-        } = worst;
-        format!("{name} of the {part} is {value:.3} rad; its limits are {min:.3} and {max:.3} rad")
+        describe(part)
     };
-    let at = solids.phalanges[worst.digit.index()][worst.phalanx.index()].start;
+    let at = solids.phalanges[digit.index()][phalanx.index()].start;
     Verdict::measured(Check::JointLimits, measure, description).of(part, at, None)
 }
 
@@ -426,7 +381,6 @@ fn place(distance: f32, inside: &str) -> String {
     }
 }
 
-/// A length in words.
 fn millimetres(metres: f32) -> String {
     format!("{:.1} mm", 1000.0 * metres)
 }

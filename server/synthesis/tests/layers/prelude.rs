@@ -67,7 +67,7 @@ pub(crate) use grasp_synthesis::{
     },
     search::{
         GraspSource, SearchEnd, SearchOutcome,
-        attempt::PhysicalAttempt,
+        attempt::hold_or_refine,
         current::{CurrentGrasp, CurrentGraspStatus, Settlement},
         verdicts::Judgement,
     },

@@ -17,12 +17,10 @@ use crate::{
     },
 };
 
-/// Length below which a vector has no direction. Applies to sums of unit vectors and to distances in hand lengths, where it is
-/// 0.2 mm on an adult's hand.
+/// Length below which a vector has no direction.
 const MIN_LENGTH: f32 = 1e-3;
 
-/// Sine of the angle off a link's pad over which a contact turns from pad to side: about 30° to 60°. Smaller values count more
-/// pad contacts as side contacts.
+/// Sine of the angle off a link's pad over which a contact turns from pad to side: about 30° to 60°.
 const SIDE: [f32; 2] = [0.5, 0.87];
 
 /// Component of [`Touch::local`] along the link over which a contact turns from pad to tip: pushes about 30° to 50° off the pad's
@@ -33,12 +31,10 @@ const TIP: [f32; 2] = [0.26, 0.43];
 /// three digits. Larger values require more exactly opposite presses.
 const OPPOSED: [f32; 2] = [0.0, 0.5];
 
-/// Minimum negative cosine between two pushes for their distance to count as a thickness: 105° apart. A larger one leaves more
-/// grasps without a thickness.
+/// Minimum negative cosine between two pushes for their distance to count as a thickness: 105° apart.
 const THICKNESS_OPPOSITION: f32 = 0.25;
 
-/// Power with which such pairs count more, the more opposed they are. A larger one follows the most opposed pair, which a slight
-/// change of the hand may replace by another.
+/// Power with which such pairs count more, the more opposed they are.
 const THICKNESS_POWER: i32 = 2;
 
 /// Weight of the diameter of the held part itself, which decides where no contacts are opposed: a fifth of that of an exactly
@@ -54,7 +50,6 @@ const SECOND_AND_THIRD_LINK: f32 = 0.35;
 /// A contact of a link or the palm.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Touch {
-    /// Contact point.
     pub(super) position: Vec3,
     /// Direction into the object, a unit vector.
     pub(super) push: Vec3,
@@ -67,11 +62,9 @@ pub(super) struct Touch {
 /// The features of a finger. Degrees of membership are from 0 to 1.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Finger {
-    /// True if it touches.
     pub(super) touches: bool,
     /// How far it holds with more than its last link, 0 to 1.
     pub(super) inner: f32,
-    /// Its contact nearest to the tip.
     pub(super) position: Vec3,
     /// Mean direction of its links' pushes, a unit vector or zero.
     pub(super) push: Vec3,
@@ -96,13 +89,11 @@ pub(super) struct Finger {
 pub(super) struct Thumb {
     /// True if one of its two phalanges touches. Its metacarpal counts as palm.
     pub(super) touches: bool,
-    /// True if more than its last link touches.
     pub(super) is_inner: bool,
     /// Mean direction of its phalanges' presses, a unit vector or zero.
     pub(super) press: Vec3,
     /// Degree to which the last link touches with its very tip, 0 to 1.
     pub(super) tip: f32,
-    /// Height of its tip above the palm's plane, in hand lengths.
     pub(super) height: f32,
     /// Direction of its last link, a unit vector.
     pub(super) along: Vec3,
@@ -111,13 +102,10 @@ pub(super) struct Thumb {
 /// All the features that distinguish the types.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Features {
-    /// The thumb.
     pub(super) thumb: Thumb,
-    /// Index, middle, ring and little finger.
     pub(super) fingers: [Finger; 4],
     /// One bit per touching finger, the index finger's the lowest.
     pub(super) touching: u8,
-    /// True if the palm touches.
     pub(super) palm_touches: bool,
     /// Degree to which the palm or the roots of the fingers support the object, 0 to 1.
     pub(super) palm_support: f32,
@@ -128,7 +116,6 @@ pub(super) struct Features {
     pub(super) convergence: f32,
     /// How much the digits push toward the palm, -1 to 1: 0 around the rim of a disk that the palm faces.
     pub(super) pull: f32,
-    /// The shape of what is held.
     pub(super) part: HeldPart,
 }
 
@@ -170,7 +157,6 @@ impl Features {
         }
     }
 
-    /// The fingers that touch.
     pub(super) fn touching_fingers(&self) -> impl Iterator<Item = &Finger> {
         self.fingers.iter().filter(|finger| finger.touches)
     }
@@ -247,7 +233,6 @@ impl Frame {
         }
     }
 
-    /// A contact of the palm, which can push only outward.
     fn palm_touch(&self, contact: &Contact) -> Touch {
         let inward = -self.wrist_from_object.transform_vector(contact.normal);
         let outward = if inward.z < 0.0 { -inward } else { inward };
@@ -376,12 +361,10 @@ pub(super) fn bent(angle: f32, degrees: [f32; 2]) -> f32 {
     rising(angle, degrees.map(f32::to_radians))
 }
 
-/// The complement of [`bent`].
 pub(super) fn straight(angle: f32, degrees: [f32; 2]) -> f32 {
     falling(angle, degrees.map(f32::to_radians))
 }
 
-/// The vector normalized, or zero if it is too short.
 fn direction(vector: Vec3) -> Vec3 {
     if vector.length() < MIN_LENGTH {
         Vec3::ZERO

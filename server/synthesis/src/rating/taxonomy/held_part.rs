@@ -15,12 +15,10 @@ use crate::{
     },
 };
 
-/// Radius of the part as a multiple of the root mean square distance of the contacts from its centre. A larger one includes the
-/// ends of a can that is held by its side.
+/// Radius of the part as a multiple of the root mean square distance of the contacts from its centre.
 const RADIUS_PER_SPAN: f32 = 1.2;
 
-/// Range of that radius, in hand lengths: 3 to 7 cm on an adult's hand. Less would not tell a rod from a plate; more is out of
-/// the hand's reach.
+/// Range of that radius, in hand lengths: 3 to 7 cm on an adult's hand.
 const RADIUS_RANGE: [f32; 2] = [0.15, 0.35];
 
 /// Diameter of a rod over [`HeldPart::thickness`]: √2 for a round one, 1.34 for a square one.
@@ -85,9 +83,7 @@ impl HeldPart {
             all_around: evenness(&part.facing, x, y) * evenness(&part.spread, x, y),
         }
     }
-}
 
-impl HeldPart {
     /// Its diameter, in hand lengths, if it is as thick as wide: exact within 3 % for round and square rods.
     pub(super) fn diameter(&self) -> f32 {
         DIAMETER_PER_THICKNESS * self.thickness
@@ -147,8 +143,7 @@ const RING: [f32; 2] = [0.05, 0.12];
 /// Width in hand lengths over which something becomes too thick for a loop as on scissors: 3 to 6 cm on an adult's hand.
 const LOOP: [f32; 2] = [0.15, 0.3];
 
-/// Convergence of the outer fingers' pushes over which a prism becomes round. On a sphere, three fingertips are about a radius
-/// apart, which gives 1.
+/// Convergence of the outer fingers' pushes over which a prism becomes round.
 const ROUND: [f32; 2] = [0.25, 0.7];
 
 /// Sphericity over which a held part becomes a ball: 0.6 for a cube, 0.75 for a can as high as wide, over 0.9 for an apple.
@@ -165,8 +160,7 @@ const ROUND_SECTION: [f32; 2] = [0.7, 0.85];
 /// a glass: its outline curves with five to two and a half times the radius of its section.
 const CURVED_ALONG: [f32; 2] = [0.2, 0.4];
 
-/// Widths in hand lengths that fingertips feel as bulging: from 27 to 36 mm on an adult's hand, up to 11 to 14 cm. They feel the
-/// ends of something thinner as ends, and cannot reach around anything wider.
+/// Widths in hand lengths that fingertips feel as bulging: from 27 to 36 mm on an adult's hand, up to 11 to 14 cm.
 const WIDE_ENOUGH: [f32; 2] = [0.14, 0.19];
 const TOO_WIDE: [f32; 2] = [0.6, 0.75];
 
@@ -201,41 +195,27 @@ const OTHER_SHAPE: f32 = 0.6;
 /// How well what is held fits, 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShapeFits {
-    /// A ball, or what feels like one to fingertips.
     pub(super) ball: f32,
-    /// A ball for a whole hand.
     pub(super) ball_in_fist: f32,
     /// A disk, or the end of a cylinder, that the palm faces and the digits hold by its rim.
     pub(super) disk: f32,
     /// Something straight across the fingers: neither ball nor disk.
     pub(super) prismatic: f32,
-    /// Something round or at least compact.
     pub(super) compact: f32,
     /// Something that a hand wraps around: neither ball nor disk, and not flat.
     pub(super) bar: f32,
-    /// A plate, whatever it is held by.
     pub(super) plate: f32,
     /// Something flat that stretched fingers lie along; in part, any prism.
     pub(super) flat: f32,
-    /// A thin rod.
     pub(super) pen: f32,
-    /// A rod that fingers can steady.
     pub(super) stick: f32,
-    /// Something that thumb and index finger close around.
     pub(super) ring: f32,
-    /// Something as thin as the loops of scissors.
     pub(super) loops: f32,
-    /// Narrow enough for thumb and index finger.
     pub(super) pinchable: f32,
-    /// Narrow enough for the side of a finger, and no ball.
     pub(super) between_sides: f32,
-    /// Thin enough for the tip of an adducted thumb to lie on it.
     pub(super) light: f32,
-    /// Of small diameter.
     pub(super) small: f32,
-    /// Of medium diameter.
     pub(super) medium: f32,
-    /// Of large diameter.
     pub(super) large: f32,
 }
 

@@ -1,10 +1,7 @@
 //! Classifies grasps by the GRASP taxonomy (thesis 2.4). The thesis judges by eye and calls grasps of no type unnatural
-//! (5.2, 6.1); this computes the type of every grasp.
-//!
-//! - [`GraspType`]: the types and the cells they belong to.
-//! - [`classify`]: from a posed hand, its contacts and what it holds to a type. `features` and `held_part` measure, `scores`
-//!   rates each type by the fit to its cell times the fit within the cell, and `KIN` says which types an expert may take for each
-//!   other. The taxonomy's paper defines types by pictures; criteria and thresholds are this project's reading of those.
+//! (5.2, 6.1); this computes the type of every grasp: `features` and `held_part` measure, `scores` rates each type by the fit to its
+//! cell times the fit within the cell, and `KIN` says which types an expert may take for each other. The taxonomy's paper defines
+//! types by pictures; criteria and thresholds are this project's reading of those.
 
 mod features;
 mod held_part;
@@ -25,8 +22,7 @@ use crate::{
     },
 };
 
-/// Share of the best rival's fit that is subtracted from the winner's if the two are not kin: a tie halves the confidence. A
-/// larger one requires a clearer lead.
+/// Share of the best rival's fit that is subtracted from the winner's if the two are not kin: a tie halves the confidence.
 const DOUBT: f32 = 0.5;
 
 /// The same share for kin. An expert who prefers the rival still accepts the winner.
@@ -44,7 +40,11 @@ pub fn classify(rig: &Rig, pose: &HandPose, contacts: &[Contact], shape: &LocalS
     }
     let mut doubt = 0.0_f32;
     for (index, score) in scores.iter().enumerate().filter(|(index, _)| *index != best) {
-        let share = if are_kin(best, index) { DOUBT_OF_KIN } else { DOUBT };
+        let share = if KIN_OF[best] >> index & 1 == 1 {
+            DOUBT_OF_KIN
+        } else {
+            DOUBT
+        };
         doubt = doubt.max(share * score);
     }
     let confidence = scores[best] - doubt;
@@ -97,29 +97,18 @@ fn scores(features: &Features) -> [f32; 33] {
 /// The degrees of membership that cells and types combine, 0 to 1.
 struct View<'a> {
     features: &'a Features,
-    /// What is held.
     shape: ShapeFits,
-    /// Finger pads against the palm.
     palm: f32,
-    /// Finger pads against the thumb, away from the palm.
     pad: f32,
-    /// Thumb against the index finger's side.
     side_of_index: f32,
     /// Thumb against the middle finger's side, with the index finger's pad on the object.
     side_of_middle: f32,
-    /// Index finger against middle finger.
     between_fingers: f32,
-    /// The thumb is abducted.
     abducted: f32,
-    /// The fingers hold with more than their last links.
     inner: f32,
-    /// The touching fingers are curled.
     curled: f32,
-    /// They are bent enough to wrap around something.
     around: f32,
-    /// The index finger is extended.
     index_extended: f32,
-    /// Thumb and index finger touch with their tips.
     tips: f32,
     /// A pad of another finger than the index supports the object.
     supported: f32,
@@ -171,7 +160,6 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Fit of a cell.
     fn cell(&self, cell: Cell) -> f32 {
         let thumb = match cell.thumb {
             ThumbPosition::Abducted => self.abducted,
@@ -274,20 +262,13 @@ impl<'a> View<'a> {
 
     /// Degree to which thumb and fingers are extended side by side.
     fn parallel(&self) -> f32 {
-        (1.0 - self.curled) * rising(self.along_fingers(), [0.6, 0.85])
-    }
-
-    /// Cosine of the angle between the thumb's last link and the direction of extended fingers.
-    fn along_fingers(&self) -> f32 {
         let bend = self.features.mean(|finger| finger.knuckle);
-        let along = glam::Vec3::new(0.0, bend.cos(), bend.sin());
-        self.features.thumb.along.dot(along)
+        let along_fingers = glam::Vec3::new(0.0, bend.cos(), bend.sin());
+        (1.0 - self.curled) * rising(self.features.thumb.along.dot(along_fingers), [0.6, 0.85])
     }
 }
 
-/// How well the touching fingers match those of a cell. Against the palm, one outer finger more or less matters little. Against
-/// the thumb, a set shifted by one finger still fits in part: a pinch with the middle finger is one, with the ring finger it is
-/// not. A gap between touching fingers matters more.
+/// How well the touching fingers match those of a cell. Against the palm, one outer finger more or less matters little.
 #[expect(
     clippy::match_same_arms,
     reason = "palm and thumb oppositions are grouped separately"
@@ -390,8 +371,3 @@ const KIN_OF: [u64; GraspType::ALL.len()] = {
     }
     kin_of
 };
-
-/// True if the types with two indices of [`GraspType::ALL`] are kin.
-fn are_kin(a: usize, b: usize) -> bool {
-    KIN_OF[a] >> b & 1 == 1
-}

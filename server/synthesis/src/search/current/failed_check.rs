@@ -12,10 +12,10 @@ use crate::{
         requirements::{Check, Requirements},
     },
     physical::{
-        barriers::{BarrierClearances, Nearest},
+        barriers::{BarrierClearances, Nearest, nearest_hand, nearest_obstacle},
         grip::{self, FORBIDDEN_CLEARANCE, Gripper, PosedDigits},
         presented::Presented,
-        solids::SOFT_CONTACT,
+        solids::{NearestParts, SOFT_CONTACT, self_clearance},
     },
     search::{
         limits::Limit,
@@ -24,6 +24,10 @@ use crate::{
         settings::SearchSettings,
     },
 };
+
+/// How much closer than measured a forbidden surface may be, in metres; see
+/// [`crate::geometry::mesh_bvh::MeshBvh::closest_to_capsule`].
+const GAP_SLACK: f32 = 2e-5;
 
 /// Why a current grasp is not kept, and by how much.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,9 +59,6 @@ impl FailedCheck {
 }
 
 /// The grasp of a hand as it is, which may be closer to other people's hands by `grace` metres.
-///
-/// # Errors
-/// The first check that it fails.
 pub(in crate::search) fn held(
     reading: &Reading<'_>,
     grace: f32,
@@ -73,7 +74,8 @@ pub(in crate::search) fn held(
 }
 
 fn clear_of_barriers(reading: &Reading<'_>, grace: f32) -> Result<BarrierClearances, FailedCheck> {
-    if let Some(clearances) = reading.if_clear_of_barriers() {
+    let (tracked, presented) = (&reading.tracked, reading.around.presented);
+    if let Some(clearances) = grip::clear_of_barriers(tracked, presented.barriers()) {
         return Ok(clearances);
     }
     let clear_of = |nearest: Option<Nearest>, check, grace: f32| {
@@ -84,9 +86,11 @@ fn clear_of_barriers(reading: &Reading<'_>, grace: f32) -> Result<BarrierClearan
         }
         Ok(Some(nearest.distance))
     };
+    let hand = nearest_hand(tracked, reading.holdout, presented);
+    let obstacle = || nearest_obstacle(tracked, presented);
     Ok(BarrierClearances {
-        hands: clear_of(reading.nearest_hand(), Check::GiverClearance, grace)?,
-        obstacles: clear_of(reading.nearest_obstacle(), Check::ObstacleClearance, 0.0)?,
+        hands: clear_of(hand, Check::GiverClearance, grace)?,
+        obstacles: clear_of(obstacle(), Check::ObstacleClearance, 0.0)?,
     })
 }
 
@@ -95,13 +99,15 @@ fn clear_of_solids(reading: &Reading<'_>) -> Result<f32, FailedCheck> {
     let deepest = unstopped(|stop| reading.deepest(stop));
     let penetration = depth(deepest.as_ref());
     kept(Check::Penetration, penetration)?;
-    if !reading.is_clear_of_itself()
-        && let Some(parts) = reading.closest_parts()
+    let (rig, object) = (reading.around.rig, reading.around.object.object);
+    if self_clearance(rig, &reading.solids) < 0.0
+        && let Some(parts) = NearestParts::of(rig, &reading.solids)
     {
-        let measure = Measure::at_least(parts.nearest.distance, -SOFT_CONTACT);
+        let measure = Measure::at_least(parts.clearance - SOFT_CONTACT, -SOFT_CONTACT);
         kept(Check::SelfCollision, measure)?;
     }
-    if !reading.is_clear_of_forbidden()
+    let is_near = |part| object.is_forbidden_within(part, FORBIDDEN_CLEARANCE + GAP_SLACK);
+    if reading.solids.iter().any(is_near)
         && let Some(nearest) = reading.nearest_forbidden()
     {
         let measure = Measure::at_least(nearest.distance, FORBIDDEN_CLEARANCE);
@@ -110,7 +116,6 @@ fn clear_of_solids(reading: &Reading<'_>) -> Result<f32, FailedCheck> {
     Ok(penetration.figure)
 }
 
-/// The receiver's arm, if it must reach the wrist.
 fn wrist_admitted(reading: &Reading<'_>) -> Result<Option<ArmPose>, FailedCheck> {
     let (around, wrist) = (&reading.around, reading.pose.frame_from_wrist);
     let arm = around.required_arm(wrist);
@@ -149,19 +154,12 @@ fn holding(held: &Held<'_>, requirements: &Requirements) -> Result<Classificatio
 }
 
 fn kept(check: Check, measure: Measure) -> Result<(), FailedCheck> {
-    if measure.passed {
-        Ok(())
-    } else {
-        Err(FailedCheck::by(check, measure))
-    }
+    let passed = measure.passed.then_some(());
+    passed.ok_or_else(|| FailedCheck::by(check, measure))
 }
 
 fn holds(check: Check, passed: bool) -> Result<(), FailedCheck> {
-    if passed {
-        Ok(())
-    } else {
-        Err(FailedCheck::new(check))
-    }
+    passed.then_some(()).ok_or_else(|| FailedCheck::new(check))
 }
 
 /// The first `count` preferred hands of the settings that are not valid, by their places, and why: the first check that each
@@ -236,47 +234,35 @@ fn of_known_grips(scene: &Scene<'_>, settings: &SearchSettings) -> Check {
 impl fmt::Display for FailedCheck {
     /// A phrase that completes "the grasp failed:".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let figure = self.figure.unwrap_or_default();
-        let bound = self.bound.unwrap_or_default();
-        let mm = |metres: f32| 1e3 * metres;
-        let nears = |f: &mut fmt::Formatter<'_>, what: &str| {
+        let [figure, bound] = [self.figure, self.bound].map(Option::unwrap_or_default);
+        let [mm, bound_mm] = [figure, bound].map(|metres| 1e3 * metres);
+        let nears = |what: &str| {
             if figure < 0.0 {
-                write!(f, "the hand is {:.1} mm inside {what}", -mm(figure))
+                format!("the hand is {:.1} mm inside {what}", -mm)
             } else {
-                write!(
-                    f,
-                    "the hand is {:.1} mm from {what}, less than {:.1} mm",
-                    mm(figure),
-                    mm(bound)
-                )
+                format!("the hand is {mm:.1} mm from {what}, less than {bound_mm:.1} mm")
             }
         };
-        match self.check {
-            Check::GiverClearance => nears(f, "another person's hand"),
-            Check::ObstacleClearance => nears(f, "an obstacle"),
-            Check::Forbidden => nears(f, "a forbidden surface"),
-            Check::Penetration => write!(
-                f,
-                "the hand sinks {:.1} mm into the object, more than {:.1} mm",
-                mm(figure),
-                mm(bound)
-            ),
-            Check::SelfCollision => write!(
-                f,
-                "parts of the hand go {:.1} mm through each other, more than {:.1} mm",
-                -mm(figure),
-                -mm(bound)
-            ),
-            Check::Reach if self.figure.is_none() => {
-                f.write_str("the receiver's arm does not reach the wrist clear of object and others")
+        f.write_str(&match self.check {
+            Check::GiverClearance => nears("another person's hand"),
+            Check::ObstacleClearance => nears("an obstacle"),
+            Check::Forbidden => nears("a forbidden surface"),
+            Check::Penetration => {
+                format!("the hand sinks {mm:.1} mm into the object, more than {bound_mm:.1} mm")
             }
-            Check::Reach => write!(
-                f,
-                "the wrist is {figure:.2} m from the shoulder, beyond the reach of {bound:.2} m"
-            ),
-            Check::Approach => f.write_str("the hand does not come from within the required approach"),
-            Check::Banned => f.write_str("the hand is near a forbidden grip"),
-            Check::Digits => f.write_str("the requirements do not admit the digits that touch"),
+            Check::SelfCollision => {
+                let [mm, most] = [-mm, -bound_mm];
+                format!("parts of the hand go {mm:.1} mm through each other, more than {most:.1} mm")
+            }
+            Check::Reach if self.figure.is_none() => {
+                "the receiver's arm does not reach the wrist clear of object and others".to_owned()
+            }
+            Check::Reach => {
+                format!("the wrist is {figure:.2} m from the shoulder, beyond the reach of {bound:.2} m")
+            }
+            Check::Approach => "the hand does not come from within the required approach".to_owned(),
+            Check::Banned => "the hand is near a forbidden grip".to_owned(),
+            Check::Digits => "the requirements do not admit the digits that touch".to_owned(),
             Check::Closure => {
                 // A share of nothing is none.
                 let share = if figure > 0.0 {
@@ -284,25 +270,19 @@ impl fmt::Display for FailedCheck {
                 } else {
                     0.0
                 };
-                write!(
-                    f,
-                    "the contacts have {:.0} % of the closure that holds the object",
-                    100.0 * share
-                )
+                let percent = 100.0 * share;
+                format!("the contacts have {percent:.0} % of the closure that holds the object")
             }
-            Check::GraspType => f.write_str("the requirements do not admit the grasp's type"),
-            Check::Balance => write!(
-                f,
-                "the contacts leave {:.0} % of the weight unbalanced, more than {:.0} %",
-                100.0 * figure,
-                100.0 * bound
-            ),
-            Check::Comfort => f.write_str("the forces are less comfortable than the requirements admit"),
-            Check::Score => write!(
-                f,
-                "the score of another grasp is higher by {figure:.3}, at least {bound:.3}"
-            ),
-            other => write!(f, "the hand fails the check {other:?}"),
-        }
+            Check::GraspType => "the requirements do not admit the grasp's type".to_owned(),
+            Check::Balance => {
+                let [percent, most] = [figure, bound].map(|share| 100.0 * share);
+                format!("the contacts leave {percent:.0} % of the weight unbalanced, more than {most:.0} %")
+            }
+            Check::Comfort => "the forces are less comfortable than the requirements admit".to_owned(),
+            Check::Score => {
+                format!("the score of another grasp is higher by {figure:.3}, at least {bound:.3}")
+            }
+            other => format!("the hand fails the check {other:?}"),
+        })
     }
 }

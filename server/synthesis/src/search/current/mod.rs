@@ -17,7 +17,6 @@ use super::{
     GraspSource, SearchOutcome,
     key_frames::withdrawal,
     known_grips::grasp_value,
-    prepare,
     scene::{Scene, Task},
     settings::SearchSettings,
 };
@@ -146,7 +145,6 @@ pub(super) fn nearness(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp)
     1.0 + (1.0 + way_of(scene, current, grasp)).recip()
 }
 
-/// True if a search need not look for a nearer grasp.
 pub(super) fn is_at_hand(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> bool {
     way_of(scene, current, grasp) <= AT_HAND
 }
@@ -271,7 +269,7 @@ pub fn nearest_grasp(
         is_committed: false,
         grace: Grace::default(),
     });
-    let scene = prepare(task, &settings);
+    let scene = Scene::new(task, &settings);
     let around = scene.surroundings()?;
     let mut gripper = Gripper::default();
     if let Ok(grasp) = around.hold_posed(&hand, &mut gripper) {

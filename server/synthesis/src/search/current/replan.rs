@@ -12,7 +12,7 @@ use super::{
 use crate::{
     base::stop::{Stop, Stopped},
     known::{
-        atlas::{Atlas, Grips},
+        atlas::{Atlas, Grips, QUANTA},
         entry::Entry,
         recheck::GripChecker,
     },
@@ -40,11 +40,7 @@ const SAME: f32 = 1e-5;
 /// Distance of two forearms' directions up to which hands may be the same: [`SAME`] in a radian's metres, and rounding.
 const ALIKE: f32 = 2.0 * SAME / METRES_PER_RADIAN;
 
-/// Steps of an entry's score.
-const QUANTA: f32 = 254.0;
-
-/// How much higher than estimated a score may be: gravity is up to 18° from the direction that an entry was rated under. More
-/// checks more grips in vain.
+/// How much higher than estimated a score may be: gravity is up to 18° from the direction that an entry was rated under.
 const ESTIMATE_SLACK: f32 = 0.05;
 
 /// A current grasp that is kept or adjusted, and the verdict on it.
@@ -53,15 +49,12 @@ pub(super) type Kept = (Box<Grasp>, CurrentGraspVerdict);
 /// A valid known grip.
 #[derive(Debug)]
 pub(super) struct Known {
-    /// Where it comes from.
     pub(super) source: GraspSource,
-    /// The grasp.
     pub(super) grasp: Box<Grasp>,
     /// How far it is short of keeping clear of where other hands were lately, as a way in metres.
     pub(super) lack: f32,
 }
 
-/// Looks for known grips.
 pub(super) struct Replanner<'a> {
     scene: &'a Scene<'a>,
     settings: &'a SearchSettings,
@@ -97,15 +90,18 @@ impl<'a> Replanner<'a> {
         if let Some(preferred) = self.preferred(gripper, stop)? {
             return Ok(Some(preferred));
         }
-        if let Some(atlas) = self.atlas
-            && let Some(known) = self.nearest_of(atlas.grips(), GraspSource::Atlas, gripper, stop)?
-        {
-            return Ok(Some(known));
+        let of_atlas = self
+            .atlas
+            .map(|atlas| (atlas, GraspSource::Atlas as fn(u16) -> _));
+        let of_learned = self
+            .learned
+            .map(|learned| (learned, GraspSource::Learned as fn(u16) -> _));
+        for (atlas, source) in of_atlas.into_iter().chain(of_learned) {
+            if let Some(known) = self.nearest_of(atlas.grips(), source, gripper, stop)? {
+                return Ok(Some(known));
+            }
         }
-        let Some(learned) = self.learned else {
-            return Ok(None);
-        };
-        self.nearest_of(learned.grips(), GraspSource::Learned, gripper, stop)
+        Ok(None)
     }
 
     /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; `None` if none is
@@ -153,7 +149,6 @@ impl<'a> Replanner<'a> {
         Ok(self.cheapest(valid))
     }
 
-    /// The grip that costs least, first in order of equal ones.
     fn cheapest(&self, mut valid: Vec<(f32, Known)>) -> Option<Known> {
         valid.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<(f32, Known)> = None;
@@ -169,7 +164,6 @@ impl<'a> Replanner<'a> {
         best.map(|(_, known)| known)
     }
 
-    /// The nearest valid one of the preferred hands.
     fn preferred(&self, gripper: &mut Gripper, stop: Stop<'_>) -> Result<Option<Known>, Stopped> {
         let present = self.current.present.frame_from_wrist;
         let mut hands: Vec<_> = self.settings.known.preferred.iter().enumerate().collect();
@@ -200,7 +194,6 @@ impl<'a> Replanner<'a> {
         Some(grasp)
     }
 
-    /// The place of a hand among known grips.
     fn place_of(&self, hand: &HandPose, grips: &Grips) -> Option<u16> {
         let is_same = |entry: &Entry| {
             let pose = &entry.grip.pose;
@@ -255,9 +248,7 @@ impl<'a> Replanner<'a> {
 
     /// An upper bound of the score that a grip has here, as far as its stored scores tell.
     fn score_bound(&self, atlas: &Atlas, index: u16, entry: &Entry) -> f32 {
-        let GraspContext {
-            object, presented, ..
-        } = self.around;
+        let (object, presented) = (self.around.object, self.around.presented);
         let own_friction = object.object.friction_under(Validity::Physical);
         if !object.object.regions().is_empty() || object.friction != own_friction {
             return 1.0;
@@ -278,33 +269,23 @@ impl<'a> Replanner<'a> {
 
     /// The grasp of a known grip, if it is valid here, and how far it is short of where other hands were lately.
     fn check(&self, grips: &Grips, index: u16, gripper: &mut Gripper) -> Option<(Box<Grasp>, f32)> {
-        let solids = grips.screen(
-            usize::from(index),
-            self.around.rig,
-            self.around.presented.barriers(),
-        )?;
-        let grasp = self
-            .checker
-            .check(&grips.entries()[usize::from(index)], &solids, gripper)?;
+        let place = usize::from(index);
+        let barriers = self.around.presented.barriers();
+        let solids = grips.screen(place, self.around.rig, barriers)?;
+        let grasp = self.checker.check(&grips.entries()[place], &solids, gripper)?;
         let recent = self.scene.recent_hands();
         Some((grasp, recent.map_or(0.0, |recent| recent.lack(&solids))))
     }
 
     /// The grasp of a hand as it is, which may be closer to other people's hands by `grace` metres.
-    ///
-    /// # Errors
-    /// The first check that it fails.
     pub(super) fn hold(
         &self,
         pose: &HandPose,
         grace: f32,
         gripper: &mut Gripper,
     ) -> Result<Box<Grasp>, FailedCheck> {
-        held(
-            &Reading::new(*self.around, self.scene.task.holdout, pose),
-            grace,
-            gripper,
-        )
+        let reading = Reading::new(*self.around, self.scene.task.holdout, pose);
+        held(&reading, grace, gripper)
     }
 
     /// The current grasp that failed a check, if a grace keeps it.
@@ -313,10 +294,8 @@ impl<'a> Replanner<'a> {
             return None;
         }
         let grasp = self.hold(&self.current.hand, grace, gripper).ok()?;
-        Some((
-            grasp,
-            CurrentGraspVerdict::new(CurrentGraspStatus::Kept, Some(failed)),
-        ))
+        let verdict = CurrentGraspVerdict::new(CurrentGraspStatus::Kept, Some(failed));
+        Some((grasp, verdict))
     }
 
     /// The answer with a grasp of the same hand, under a verdict that lacks the way.

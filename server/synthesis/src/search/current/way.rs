@@ -105,7 +105,6 @@ pub(super) fn cost_if_free(rig: &Rig, from: &HandPose, to: &Grasp, score: f32) -
         + SCORE * (1.0 - score)
 }
 
-/// What it costs more if it is not free.
 pub(super) fn detour(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> f32 {
     if is_free(scene, from, to) { 0.0 } else { DETOUR }
 }

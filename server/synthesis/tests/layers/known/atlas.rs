@@ -27,7 +27,7 @@ fn a_growth_that_is_not_enough_keeps_all() {
     let growth = grown_to(object("remote"), right(), 20);
     let (grown, kept) = (growth.grown(), growth.kept());
     assert_eq!(kept.atlas.entries(), grown.atlas.entries());
-    assert!(!kept.atlas.is_complete() && kept.proposed() == grown.proposed());
+    assert!(!kept.atlas.is_complete() && kept.proposed == grown.proposed);
 }
 
 #[test]
@@ -256,4 +256,21 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn the_listed_part_of_an_atlas_is_an_atlas_of_its_own() {
+    let (object, rig) = (object("scissors"), right());
+    let (grown, _) = &*YOUNG;
+    let listed = grown.listed(object, rig);
+    let (few, all) = (listed.atlas.entries(), grown.atlas.entries());
+    let mut left = all.iter();
+    assert!(!few.is_empty() && few.len() < all.len());
+    assert!(few.iter().all(|grip| left.any(|other| other == grip)), "in order");
+    // They cannot pass for a complete atlas, nor for an interrupted growth.
+    assert!(!listed.atlas.is_complete());
+    assert_eq!((listed.proposed, listed.early_stamp), (0, grown.early_stamp));
+    // It round-trips like any other.
+    let bytes = encode(&listed, object, rig);
+    assert_eq!(decode_scissors(&bytes).expect("it is whole"), listed);
 }

@@ -138,7 +138,7 @@ fn farthest_clearance(entry: &Entry, giver: &TrackedSolids) -> f32 {
 }
 
 fn entries_of(seeds: &Seeds) -> Vec<u16> {
-    seeds.all().iter().map(|seed| seed.entry).collect()
+    seeds.0.iter().map(|seed| seed.entry).collect()
 }
 
 #[test]
@@ -168,10 +168,10 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
         let without_giver = of(holding, Barriers::NONE, false).expect("nothing stops it");
         let best = entries_of(&without_giver);
         assert!(best.len() >= 32 && holding.starts_with(&best));
-        assert_eq!(seeds.all().len(), best.len());
+        assert_eq!(seeds.0.len(), best.len());
         let distinct: HashSet<u16> = entries_of(&seeds).into_iter().collect();
-        assert_eq!(distinct.len(), seeds.all().len());
-        for (&Seed { entry, kept }, expected) in seeds.all().iter().zip(clearances) {
+        assert_eq!(distinct.len(), seeds.0.len());
+        for (&Seed { entry, kept }, expected) in seeds.0.iter().zip(clearances) {
             let known = &known.entries()[usize::from(entry)];
             assert!(known.finger_subsets.contains(kept), "giver {grip}, {entry}");
             let found = clearance(known, kept, &giver);
@@ -181,7 +181,7 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
             );
         }
         assert_eq!(of(holding, presented.barriers(), true), Err(Stopped));
-        assert!(of(&[], presented.barriers(), false).is_ok_and(|none| none.all().is_empty()));
+        assert!(of(&[], presented.barriers(), false).is_ok_and(|none| none.0.is_empty()));
     }
 }
 

@@ -121,6 +121,43 @@ fn attempts_beyond_the_cache_draw_as_without_it() {
     assert!(cached > ROWS as usize / 2, "{cached}");
 }
 
+fn holds_freely(object: &GraspObject, proposal: &Proposal, gripper: &mut Gripper) -> bool {
+    holds(gripper, &surroundings(object, &NO_GIVER, right()), proposal)
+}
+
+#[test]
+fn hands_rated_better_hold_more_often() {
+    for name in OBJECT_NAMES {
+        let object = object(name);
+        let bulk = ObjectFeatures::of(object);
+        let mut gripper = Gripper::answering();
+        let mut rated: Vec<(f32, bool)> = (0..6000)
+            .filter_map(|index| {
+                let candidate =
+                    place(object, right()).fitting_candidate(&mut AttemptStream::new(41, index))?;
+                let features = bulk.inputs(
+                    right(),
+                    candidate.opposition,
+                    candidate.object_from_wrist,
+                    Barriers::NONE,
+                );
+                let holds = holds_freely(object, &candidate.proposal(), &mut gripper);
+                Some((TRAINED.log_odds(&features), holds))
+            })
+            .collect();
+        rated.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let held = |rated: &[(f32, bool)]| rated.iter().filter(|(_, holds)| *holds).count();
+        let (better, worse) = rated.split_at(rated.len() / 2);
+        assert!(
+            held(better) >= 2 * held(worse) && held(better) >= 20,
+            "{name}: of {} {} hold of the half rated better, {} of the other",
+            rated.len(),
+            held(better),
+            held(worse)
+        );
+    }
+}
+
 #[test]
 fn the_network_matches_its_formula_in_double_precision() {
     let mut stream = AttemptStream::new(47, 0);

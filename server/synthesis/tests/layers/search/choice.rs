@@ -4,7 +4,7 @@ use std::{cmp::Reverse, sync::Mutex};
 
 use grasp_synthesis::search::{
     FoundGrasp, GraspObserver,
-    report::{Alternative, Alternatives, Class, Differences, Part, Side},
+    report::{Alternative, Alternatives, Class, Differences, Part},
 };
 
 use crate::prelude::*;
@@ -69,34 +69,32 @@ fn an_observer_sees_every_valid_grasp_whatever_the_number_of_workers() {
     assert!(one.iter().all(|found| found.grasp.score.is_some()));
 }
 
-/// An alternative of made-up quality and class, some of them equally good.
-fn made_up(random: &mut Random, grasp: &Grasp, index: u16) -> Alternative {
-    let handedness = [Handedness::Left, Handedness::Right][random.index(2)];
-    let side = Side {
-        axis: random.index(3) as u8,
-        is_negative: random.index(2) == 0,
-    };
-    let class = Class {
-        approach: Some((side, handedness)),
-        grasp_type: None,
-        region: Some(Part::Octant(random.index(3) as u8)),
-    };
-    let is_preferred = random.index(20) == 0;
-    let found = FoundGrasp {
-        grasp: Box::new(grasp.clone()),
-        source: if is_preferred {
-            GraspSource::Preferred(index)
-        } else {
-            GraspSource::Attempt(index.into())
-        },
-        value: random.index(40) as f32 / 40.0,
-        at: Duration::ZERO,
-    };
-    Alternative {
-        class,
-        handedness,
-        found,
-    }
+/// Grasps of made-up quality and class, some of them equally good.
+fn made_up(random: &mut Random, grasp: &Grasp, number: usize) -> Vec<Alternative> {
+    (0..number)
+        .map(|index| {
+            let handedness = [Handedness::Left, Handedness::Right][random.index(2)];
+            let side = random.index(6) as u8;
+            Alternative {
+                class: Class {
+                    approach: Some((side, handedness)),
+                    grasp_type: None,
+                    region: Some(Part::Octant(random.index(3) as u8)),
+                },
+                handedness,
+                found: FoundGrasp {
+                    grasp: Box::new(grasp.clone()),
+                    source: if random.index(20) == 0 {
+                        GraspSource::Preferred(index as u16)
+                    } else {
+                        GraspSource::Attempt(index as u64)
+                    },
+                    value: random.index(40) as f32 / 40.0,
+                    at: Duration::ZERO,
+                },
+            }
+        })
+        .collect()
 }
 
 /// Preferred grips first, then by quality; of equals the first.
@@ -119,10 +117,8 @@ fn the_best_of_the_best_classes_remain_in_whatever_order_they_come() {
     let grasp = any_grasp();
     let mut random = Random::new(11);
     for round in 0..200 {
-        let (most, number) = (1 + random.index(9), random.index(120) as u16);
-        let mut offered: Vec<Alternative> = (0..number)
-            .map(|index| made_up(&mut random, &grasp, index))
-            .collect();
+        let (most, number) = (1 + random.index(9), random.index(120));
+        let mut offered = made_up(&mut random, &grasp, number);
         // By force: the best of each class, then the best of those.
         let mut best = offered.clone();
         best.sort_by(better);
@@ -139,13 +135,13 @@ fn the_best_of_the_best_classes_remain_in_whatever_order_they_come() {
                 offered.swap(place, random.index(place + 1));
             }
             for alternative in &offered {
+                // Below the least quality, none would be kept.
                 let least = kept.least().unwrap_or(0.0);
-                // What is below the least quality would not have been kept.
                 if alternative.found.value >= least || alternative.found.source.is_preferred() {
                     kept.offer(alternative.clone());
                 }
             }
-            assert_eq!(sources(&kept.into_best()), sources(&best), "round {round}");
+            assert_eq!(sources(&kept.best), sources(&best), "round {round}");
         }
     }
 }
@@ -155,18 +151,17 @@ fn the_side_is_the_one_that_the_back_of_the_hand_faces() {
     let object = bar();
     let mut grasp = any_grasp();
     // The palm faces +z of the wrist, so the back of the hand faces -z.
-    for (back, axis, is_negative) in [
-        (Vec3::new(0.9, 0.3, -0.2), 0, false),
-        (Vec3::new(-0.5, 0.1, 0.4), 0, true),
-        (Vec3::new(0.1, 0.8, 0.6), 1, false),
-        (Vec3::new(0.1, -0.8, 0.6), 1, true),
-        (Vec3::new(0.2, 0.1, 0.3), 2, false),
-        (Vec3::new(0.2, 0.1, -0.3), 2, true),
+    for (back, side) in [
+        (Vec3::new(0.9, 0.3, -0.2), 0),
+        (Vec3::new(-0.5, 0.1, 0.4), 1),
+        (Vec3::new(0.1, 0.8, 0.6), 2),
+        (Vec3::new(0.1, -0.8, 0.6), 3),
+        (Vec3::new(0.2, 0.1, 0.3), 4),
+        (Vec3::new(0.2, 0.1, -0.3), 5),
     ] {
         let orientation = Quat::from_rotation_arc(Vec3::NEG_Z, back.normalize_or(Vec3::X));
         grasp.pose.frame_from_wrist = Pose::new(Vec3::ZERO, orientation);
         let class = Class::of(&grasp, Handedness::Left, &object, BY_SIDE);
-        let side = Side { axis, is_negative };
         assert_eq!(class.approach, Some((side, Handedness::Left)));
         assert_eq!((class.grasp_type, class.region), (None, None));
     }
@@ -289,15 +284,16 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
     let around = surroundings(scissors, &NO_GIVER, right());
     let place = place(scissors, right());
     let free = floating(Arc::clone(scissors));
-    let (mut plain, mut refining) = (PhysicalAttempt::default(), PhysicalAttempt::default());
+    let (mut plain, mut refining) = (Gripper::answering(), Gripper::answering());
     let (mut held, mut refined) = (0, 0);
     for index in 0..PROPOSALS {
         let mut stream = AttemptStream::new(17, index);
         let Some(proposal) = propose(&place, &mut stream, Stop::NEVER) else {
             continue;
         };
-        let first = plain.hold(&around, &proposal, &mut Stopwatch::off(), Stop::NEVER);
-        let end = refining.hold_or_refine(
+        let first = around.hold(&proposal, &mut plain, &mut Stopwatch::off(), Stop::NEVER);
+        let end = hold_or_refine(
+            &mut refining,
             &around,
             &proposal,
             &mut stream,
@@ -310,12 +306,12 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
                 refined += 1;
                 assert!(guided(&free).judge(&grasp.pose).is_valid(), "{index}");
                 // It is not the proposed hand.
-                assert_ne!(grasp.pose.digits.as_slice(), plain.gripper.posed.as_slice());
+                assert_ne!(grasp.pose.digits.as_slice(), plain.posed.as_slice());
             }
             // Whatever was tried, a failed hand is reported as without refinement.
             (first, end) => {
                 assert_eq!(first, end, "{index}");
-                assert_eq!(plain.gripper.posed, refining.gripper.posed, "{index}");
+                assert_eq!(plain.posed, refining.posed, "{index}");
             }
         }
     }

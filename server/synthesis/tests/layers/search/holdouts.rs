@@ -1,14 +1,11 @@
 //! Searches on whole holdouts.
 
-use grasp_synthesis::search::{
-    LookUp,
-    evaluation::{HINDRANCES, SIDES},
-};
+use grasp_synthesis::search::evaluation::{HINDRANCES, SIDES};
 
 use crate::prelude::*;
 
 /// A look-up under a clock that advances by a microsecond per reading.
-fn look_up(search: &Search<'_>, within: Duration) -> LookUp {
+fn look_up(search: &Search<'_>, within: Duration) -> Result<SearchOutcome, usize> {
     search.look_up(&FakeClock::ticking(1_000), within)
 }
 
@@ -27,8 +24,8 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
         let mut last = None;
         let in_parts = loop {
             match look_up(&search, Duration::from_micros(3)) {
-                LookUp::Found(outcome) => break Some(*outcome),
-                LookUp::NotFound { tried } => {
+                Ok(outcome) => break Some(outcome),
+                Err(tried) => {
                     if last == Some(tried) {
                         break None;
                     }
@@ -40,22 +37,24 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
             }
         };
         let by_search = search.run_on(&pool);
-        let tried = match whole {
-            LookUp::NotFound { tried } => Some(tried),
-            LookUp::Found(_) => None,
-        };
-        let [whole, in_parts] = [whole.found(), in_parts]
-            .map(|found| found.map(|outcome| (outcome.grasp, outcome.report.source)));
-        assert_eq!(in_parts, whole, "giver {giver}");
-        assert_eq!(
-            (by_search.grasp, by_search.report.source),
-            whole.unwrap_or_default()
-        );
-        if tried.is_none() {
-            cut += usize::from(last.is_some());
-        } else {
-            assert_eq!(last, tried);
-            nothing += 1;
+        match (whole.clone().ok(), in_parts) {
+            (Some(whole), Some(in_parts)) => {
+                assert_eq!(
+                    (whole.grasp.as_ref(), whole.report.source),
+                    (in_parts.grasp.as_ref(), in_parts.report.source)
+                );
+                assert_eq!(
+                    (by_search.grasp, by_search.report.source),
+                    (whole.grasp, whole.report.source)
+                );
+                cut += usize::from(last.is_some());
+            }
+            (None, None) => {
+                assert_eq!(by_search.grasp, None);
+                assert_eq!(last, whole.err());
+                nothing += 1;
+            }
+            (whole, in_parts) => panic!("giver {giver}: {whole:?}, in parts {in_parts:?}"),
         }
     }
     assert!(cut >= 10 && nothing >= 3, "{cut} {nothing}");
@@ -144,4 +143,106 @@ fn a_stopped_rating_counts_what_it_has_checked() {
     let asked = AtomicUsize::new(0);
     let is_over = || asked.fetch_add(1, Ordering::Relaxed) >= 10;
     assert_eq!(search.evaluate(Stop::when(&is_over)).known(), 10);
+}
+
+/// Grips of the remote in these tests.
+const GRIPS: usize = 400;
+
+/// Settings per test.
+const SETTINGS: usize = 60;
+
+static REMOTE: LazyLock<Arc<Atlas>> =
+    LazyLock::new(|| Arc::new(grown_to(object("remote"), right(), GRIPS).atlas()));
+
+/// Distances of a hand from the nearest of the holdout's hands and obstacles, pair by pair and ball by ball.
+fn distances(holdout: &Holdout, pose: &HandPose) -> [f32; 2] {
+    let ours = tracked(pose);
+    let hands = holdout.other_hands.iter().filter_map(HandShape::joints);
+    let from_hands = hands.map(|hand| pair_distance(ours.iter(), TrackedSolids::of_joints(hand).iter()));
+    let obstacles = holdout.obstacles.iter();
+    let from_obstacles =
+        obstacles.flat_map(|other| ours.iter().map(move |solid| sampled_distance(other, solid)));
+    let least = f32::INFINITY;
+    [
+        from_hands.fold(least, f32::min),
+        from_obstacles.fold(least, f32::min),
+    ]
+}
+
+/// The remote among random hands and obstacles, some of which touch it.
+fn crowded(random: &mut Random) -> Holdout {
+    let mut holdout = floating(Arc::clone(object("remote")));
+    for _ in 0..random.index(3) {
+        let grip = &REMOTE.entries()[random.index(REMOTE.entries().len())].grip;
+        let hand = Box::new(HandJoints::of_pose(right(), &grip.pose));
+        holdout.other_hands.push(HandShape::Joints(hand));
+    }
+    for _ in 0..=random.index(2) {
+        let place = random.in_cube() * 0.12;
+        holdout.obstacles.push(if random.index(2) == 0 {
+            let end = place + random.direction() * 0.2;
+            Obstacle::Capsule(TaperedCapsule::new(place, end, 0.02, 0.01))
+        } else {
+            Obstacle::Box(oriented_box(
+                Pose::new(place, random.rotation()),
+                Vec3::new(0.05, 0.02, 0.08),
+            ))
+        });
+    }
+    holdout
+}
+
+#[test]
+fn look_ups_find_a_grip_exactly_where_one_is_clear_of_everything() {
+    let mut random = Random::new(71);
+    let (mut found, mut nothing) = (0, 0);
+    let free = valid_grips(&floating(Arc::clone(object("remote"))), &REMOTE);
+    let settings = (cases(SETTINGS as u32) as usize).max(20);
+    for setting in 0..settings {
+        let mut holdout = crowded(&mut random);
+        if setting % 3 == 0 {
+            // Among twice as many, often nothing is clear.
+            let more = crowded(&mut random);
+            holdout.other_hands.extend(more.other_hands);
+            holdout.obstacles.extend(more.obstacles);
+        }
+        let search = guided(&holdout).atlas(&REMOTE).reproducible(false);
+        let outcome = search.look_up(&FakeClock::default(), Duration::from_secs(1));
+        if let Ok(outcome) = outcome {
+            let grasp = outcome.grasp.expect("it was found");
+            assert!(matches!(outcome.report.source, Some(GraspSource::Atlas(_))));
+            assert_is_clear(setting, &holdout, &grasp);
+            found += 1;
+            continue;
+        }
+        // How far the grips that would hold without barriers are from colliding; near 0, rounding decides.
+        let margins = free.iter().flatten().map(|grasp| {
+            let [from_hands, from_obstacles] = distances(&holdout, &grasp.pose);
+            (from_hands - GIVER_CLEARANCE).min(from_obstacles)
+        });
+        let most = margins.fold(f32::NEG_INFINITY, f32::max);
+        assert!(most < 0.0005, "setting {setting}: a grip has {most} m to spare");
+        nothing += 1;
+    }
+    assert!(
+        3 * found > settings && nothing > settings / 20,
+        "{found} found, {nothing} without"
+    );
+}
+
+/// Fails if a grasp touches a barrier or reports other distances than brute force finds.
+fn assert_is_clear(setting: usize, holdout: &Holdout, grasp: &Grasp) {
+    let [from_hands, from_obstacles] = distances(holdout, &grasp.pose);
+    let is_clear = from_hands >= GIVER_CLEARANCE - 1e-6 && from_obstacles > 0.0;
+    assert!(is_clear, "setting {setting}: {from_hands} and {from_obstacles}");
+    let margins = grasp.margins.expect("it is physical");
+    for (reported, expected) in [
+        (margins.giver_clearance, from_hands),
+        (margins.obstacle_clearance, from_obstacles),
+    ] {
+        // Brute force looks at balls less than a millimetre apart.
+        let off = reported.map_or(0.0, |reported| reported - expected);
+        assert!(off.abs() < 4e-4, "{setting} {reported:?} {expected}");
+        assert_eq!(reported.is_none(), expected == f32::INFINITY, "setting {setting}");
+    }
 }
