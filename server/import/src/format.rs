@@ -1,9 +1,9 @@
 //! Recognises the format of a mesh by its content, and what bytes are that are no mesh.
 
 use crate::{
-    error::{ImportError, Violations},
+    error::ImportError,
     stl,
-    text::{is_statement, lines, without_mark, words},
+    text::{is_statement, lines, split_words, without_mark, words},
 };
 
 /// Bytes at the start that are searched for a format's marks.
@@ -34,7 +34,7 @@ impl Format {
         let start = text[..text.len().min(SEARCHED_BYTES)].trim_ascii_start();
         let mut first_words = start
             .split(|&byte| matches!(byte, b'\n' | b'\r'))
-            .filter_map(|line| line.split(u8::is_ascii_whitespace).find(|word| !word.is_empty()))
+            .filter_map(|line| split_words(line).next())
             .map(<[u8]>::to_ascii_lowercase);
         let mut word = || first_words.next().unwrap_or_default();
         match (word().as_slice(), word().as_slice()) {
@@ -43,28 +43,6 @@ impl Format {
             _ if start.starts_with(b"{") && text.windows(7).any(|part| part == b"\"asset\"") => Self::Gltf,
             _ => Self::Obj,
         }
-    }
-
-    /// Errors that say of which format an empty mesh is, since its file may be of another one than its sender believes, and what
-    /// the reader noted.
-    pub(crate) fn named(self, mut errors: Violations, notes: &[String]) -> Violations {
-        let place = match self {
-            Self::Obj => return errors,
-            Self::StlText | Self::StlBinary => "the STL mesh",
-            Self::Ply => "the PLY mesh",
-            Self::Gltf => "the glTF scene",
-        };
-        for error in &mut errors.listed {
-            if let ImportError::Empty { dropped, .. } = error {
-                let mut what = vec!["has no triangles".to_owned()];
-                if *dropped > 0 {
-                    what.push(format!("{dropped} faces without area were ignored"));
-                }
-                what.extend_from_slice(notes);
-                *error = ImportError::at(place, what.join("; "));
-            }
-        }
-        errors
     }
 }
 

@@ -94,8 +94,9 @@ impl Widths {
         let tip = index::TIP_OF_DIGIT[digit];
         let base = tip - 3;
         let of_joint = |joint: usize| {
+            let is_own = move |own: usize| own == joint || joint + 1 == tip && own == tip;
             skin.iter()
-                .filter(move |vertex| vertex.joint == joint || joint + 1 == tip && vertex.joint == tip)
+                .filter(move |vertex| is_own(vertex.joint))
                 .map(|vertex| vertex.position)
         };
         let end = skin_end(of_joint(tip - 1), skeleton.joints[tip - 1], skeleton.joints[tip]);
@@ -178,10 +179,10 @@ impl Widths {
 
     fn measure_palm(&mut self, skin: &[SkinVertex], skeleton: &Skeleton) {
         for joint in index::FIRST_OF_DIGIT.into_iter().chain([index::WRIST]) {
-            let mut distances: Vec<f32> = skin
+            let distances = skin
                 .iter()
-                .map(|vertex| vertex.position.distance(skeleton.joints[joint]))
-                .collect();
+                .map(|vertex| vertex.position.distance(skeleton.joints[joint]));
+            let mut distances: Vec<f32> = distances.collect();
             // A few stray vertices inside do not count.
             let place = FEWEST.min(distances.len()) - 1;
             let (_, &mut nearest, _) = distances.select_nth_unstable_by(place, f32::total_cmp);
@@ -192,10 +193,8 @@ impl Widths {
         // Coarse skins have few vertices there.
         let depth = PALM_AROUND.iter().find_map(|around| {
             let around = around * self.radii[index::PALM];
-            let depths = skin
-                .iter()
-                .map(|vertex| vertex.position - palm)
-                .filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
+            let offsets = skin.iter().map(|vertex| vertex.position - palm);
+            let depths = offsets.filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
             median(depths.map(|offset| offset.z).collect(), FEWEST)
         });
         if let Some(depth) = depth {

@@ -9,7 +9,7 @@ use grasp_assets::hands::hand;
 use grasp_characters::{Character, Style};
 use grasp_synthesis::model::hand::{
     Handedness,
-    joints::{HandJoints, JOINT_COUNT, JOINT_NAMES},
+    joints::{HandJoints, JOINT_COUNT, index},
     rig::Rig,
 };
 use serde_json::Value;
@@ -20,11 +20,8 @@ fn adult(side: Handedness) -> &'static Rig {
 
 /// The adult's joints at rest, as a client would describe them.
 fn adult_at_rest(side: Handedness) -> HandJoints {
-    hand("adult", side)
-        .expect("the rig is built in")
-        .skin
-        .bind
-        .clone()
+    let hand = hand("adult", side).expect("the rig is built in");
+    hand.skin.bind.clone()
 }
 
 fn source(joint_map: &[MappedJoint]) -> RigSource<'_> {
@@ -69,73 +66,50 @@ fn named(name: Name) -> Style {
 /// The name of a joint's node.
 type Name = fn(Handedness, usize) -> Option<String>;
 
-/// The model of a character whose nodes have the names of a program.
 fn model(name: Name) -> Vec<u8> {
     Character::new(&named(name)).glb
 }
 
-/// The largest differences of two rigs, with what differs most.
-struct Differences {
-    /// Of bones' ends and lengths, in metres.
-    places: (f32, String),
-    /// In radians.
-    directions: (f32, String),
-    /// Of radii, as a share.
-    radii: (f32, String),
+fn read_style(style: &Style) -> Result<ImportedRig, Vec<ImportError>> {
+    read(&Character::new(style).glb)
 }
 
-impl Differences {
-    #[track_caller]
-    fn assert_below(&self, [places, directions, radii]: [f32; 3], of: &str) {
-        assert!(self.places.0 < places, "{of}: {:?}", self.places);
-        assert!(self.directions.0 < directions, "{of}: {:?}", self.directions);
-        assert!(self.radii.0 < radii, "{of}: {:?}", self.radii);
-    }
+/// The joints of a digit, from its metacarpal to its tip.
+fn joints_of(digit: usize) -> std::ops::RangeInclusive<usize> {
+    index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]
 }
 
-fn differences(rig: &Rig, expected: &Rig) -> Differences {
-    let nothing = || (0.0, String::new());
-    let mut differences = Differences {
-        places: nothing(),
-        directions: nothing(),
-        radii: nothing(),
-    };
-    let note = |worst: &mut (f32, String), value: f32, what: String| {
-        if value > worst.0 {
-            *worst = (value, what);
-        }
-    };
-    let Differences {
-        places,
-        directions,
-        radii,
-    } = &mut differences;
-    note(places, rig.palm.distance(expected.palm), "palm".to_owned());
-    note(places, (rig.reach - expected.reach).abs(), "reach".to_owned());
-    for (digit, (own, other)) in rig.digits.iter().zip(&expected.digits).enumerate() {
+/// Asserts that rigs differ by less than limits: bones' ends and lengths in metres, directions in radians, and radii as a share.
+#[track_caller]
+fn assert_alike(rig: &Rig, expected: &Rig, limits: [f32; 3], what: &str) {
+    let mut most = [0.0_f32; 3];
+    let mut note = |kind: usize, difference: f32| most[kind] = most[kind].max(difference.abs());
+    note(0, rig.palm.distance(expected.palm));
+    note(0, rig.reach - expected.reach);
+    for (own, other) in rig.digits.iter().zip(&expected.digits) {
         let (base, other_base) = (own.wrist_from_base, other.wrist_from_base);
-        let turn = base.orientation.angle_between(other_base.orientation);
-        note(
-            places,
-            base.position.distance(other_base.position),
-            format!("base {digit}"),
-        );
-        note(directions, turn, format!("base {digit}"));
+        note(0, base.position.distance(other_base.position));
+        note(1, base.orientation.angle_between(other_base.orientation));
         assert_eq!(own.yaw_sign, other.yaw_sign);
         for link in 0..3 {
-            let length = (own.lengths[link] - other.lengths[link]).abs();
-            note(places, length, format!("length {digit} {link}"));
-            let diameter = (own.diameters[link] / other.diameters[link] - 1.0).abs();
-            note(radii, diameter, format!("diameter {digit} {link}"));
+            note(0, own.lengths[link] - other.lengths[link]);
+            note(2, own.diameters[link] / other.diameters[link] - 1.0);
         }
     }
-    let metacarpals = rig.finger_metacarpals.iter().zip(expected.finger_metacarpals);
-    for (finger, (own, other)) in metacarpals.enumerate() {
-        note(places, own.distance(other), format!("metacarpal {finger}"));
+    for (own, other) in rig.finger_metacarpals.iter().zip(expected.finger_metacarpals) {
+        note(0, own.distance(other));
     }
-    for (joint, (own, other)) in rig.joint_radii.iter().zip(expected.joint_radii).enumerate() {
-        let what = format!("radius of {} ({own} for {other})", JOINT_NAMES[joint]);
-        note(radii, (own / other - 1.0).abs(), what);
+    for (own, other) in rig.joint_radii.iter().zip(expected.joint_radii) {
+        note(2, own / other - 1.0);
     }
-    differences
+    let are_below = most.iter().zip(limits).all(|(most, limit)| *most < limit);
+    assert!(are_below, "{what}: {most:?}, {limits:?} are allowed");
+}
+
+/// Asserts that both hands are the adult's, up to limits.
+#[track_caller]
+fn assert_is_adult(rig: &ImportedRig, limits: [f32; 3], what: &str) {
+    for hand in [&rig.left, &rig.right] {
+        assert_alike(&hand.rig, adult(hand.rig.handedness), limits, what);
+    }
 }
