@@ -41,8 +41,7 @@ use format::Format;
 use raw::{Places, RawMesh, check_counts};
 use repair::repair;
 
-/// Largest distance of a vertex from the file's origin along an axis, in metres. Farther out, even double precision has steps of
-/// more than a tenth of a micrometre.
+/// Largest distance of a vertex from the file's origin along an axis, in metres, where double precision has steps of 0.1 µm.
 const MAX_COORDINATE_METRES: f64 = 1e9;
 
 /// The largest file that a reader accepts.

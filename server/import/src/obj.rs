@@ -29,8 +29,6 @@ const FACES_PER_PIECE: usize = 512;
 const LINES_PER_CHECK: usize = 1024;
 
 /// Reads OBJ text, in UTF-8 or UTF-16; `unit_metres` is the length of one unit.
-///
-/// Colours, normals and texture coordinates are ignored, and no material file is opened.
 pub(crate) fn read(
     bytes: &[u8],
     unit_metres: f32,

@@ -14,9 +14,6 @@ const SHOWN_CHARACTERS: usize = 64;
 
 /// Leaves out what is no part of the object: all that does not have one of the names in `requested` or, if there are none, what
 /// is invisible, colliders and other helpers, and lower levels of detail.
-///
-/// # Errors
-/// A requested name is none of the file, or nothing is left.
 pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<(), Violations> {
     let mut triangles = vec![0; raw.names.sets.len()];
     for face in raw.faces.iter() {

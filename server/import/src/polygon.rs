@@ -10,8 +10,7 @@ use std::collections::VecDeque;
 use glam::{DVec2, DVec3};
 use grasp_synthesis::base::stop::{Stop, Stopped};
 
-/// Largest number of corners of a polygon that is not split into a fan. Clipping ears takes a time that grows with the
-/// square of this number: up to a second for one polygon.
+/// Most corners of a polygon that is not split into a fan: clipping takes up to a second, and grows with the square of their number.
 pub(crate) const MAX_CLIPPED_CORNERS: usize = 10_000;
 
 /// Rounding errors of a corner's position that the sign of an area must exceed: one for each of its two sides.
@@ -32,7 +31,6 @@ pub(crate) enum Split {
 ///
 /// The positions are taken to be exact to single precision, at least as seen from the mesh's origin. A polygon that is not flat is
 /// split as its projection on the plane of its mean normal.
-///
 pub(crate) fn split(
     corners: &[DVec3],
     triangles: &mut Vec<[usize; 3]>,
@@ -159,8 +157,7 @@ impl Outline {
     }
 }
 
-/// Rounds through all levels. Clipping a corner without area can free ears elsewhere, once for each place where the
-/// polygon touches itself several times.
+/// Rounds through all levels: clipping a corner without area can free ears where the polygon touches itself several times.
 const ROUNDS: usize = 3;
 
 /// How much an ear may touch the rest of the polygon. Later levels are for polygons that touch themselves.

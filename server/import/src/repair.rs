@@ -26,8 +26,7 @@ const FACES_PER_CHECK: usize = 256;
 /// Vertices welded between two checks whether to stop.
 const VERTICES_PER_CHECK: usize = 4096;
 
-/// Splits polygons, welds, drops degenerate and repeated triangles, turns those that face the wrong way, and checks how they
-/// join.
+/// Splits polygons, welds, drops degenerate and repeated triangles, turns those that face the wrong way, and notes how they join.
 pub(crate) fn repair(
     mut raw: RawMesh,
     import: Import,
@@ -128,8 +127,7 @@ fn warnings(raw: &RawMesh, singles: usize, parts: usize) -> Vec<String> {
     warnings
 }
 
-/// Splits every face; one of n corners becomes n - 2 triangles, given by their corners in the file's order. Takes the corners of
-/// a mesh that has triangles only.
+/// Splits every face of n corners into n - 2 triangles; takes the corners of a mesh that has triangles only.
 fn split_faces(raw: &mut RawMesh, stop: Stop<'_>) -> Result<Vec<u32>, Violations> {
     if raw.faces.are_triangles() {
         return Ok(std::mem::take(&mut raw.corners));
@@ -166,8 +164,7 @@ fn split_faces(raw: &mut RawMesh, stop: Stop<'_>) -> Result<Vec<u32>, Violations
     Ok(triangles)
 }
 
-/// Scales positions to metres, turns +Y up, rounds to single precision and merges equal ones; returns them with the new index of
-/// each vertex.
+/// Positions in metres with +Y up, in single precision and each once, and the new index of each vertex.
 fn weld(positions: &[DVec3], import: Import, stop: Stop<'_>) -> Result<(Vec<Vec3>, Vec<u32>), Stopped> {
     let mut known = HashMap::new();
     let mut welded = Vec::new();

@@ -154,8 +154,7 @@ pub(crate) fn not_finite(line: usize, word: &[u8]) -> ImportError {
     ImportError::on_line(line, what)
 }
 
-/// The words of a name in lower case: parts between other characters than letters and digits, and before capital letters and
-/// numbers.
+/// The words of a name in lower case, which end at other characters than letters and digits, and before capitals and numbers.
 pub(crate) fn name_words(name: &str) -> Vec<String> {
     let characters: Vec<char> = name.chars().take(MAX_CHARACTERS).collect();
     let mut words: Vec<String> = Vec::new();

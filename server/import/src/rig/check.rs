@@ -14,12 +14,11 @@ use super::{
 };
 use crate::error::Violations;
 
-/// Distances of the knuckles from the wrist relative to the bones that follow them, as a mean: hands have 1.9 to 2.6, and those of
-/// cartoons at least 1.2. Below the first, the knuckles are joints in the palm; beyond the second and third, they may be others.
+/// Mean distances of the knuckles from the wrist relative to the bones after them (hands have 1.9 to 2.6, those of cartoons at
+/// least 1.2): below the first, they are joints in the palm; beyond the second and third, they may be others.
 const KNUCKLES: [f32; 3] = [0.6, 0.9, 4.0];
 
-/// Sums of the bends of a finger in the bind pose, in radians: from the first on, widths are less certain, and from the second on,
-/// a fist is seen whose skin does not show them.
+/// Sums of a finger's bends in the bind pose, in radians, from which widths are less certain, and from which they are not shown.
 const BENDS: [f32; 2] = [1.4, 2.6];
 
 /// Fewest vertices around a bone that tell where its skin is.

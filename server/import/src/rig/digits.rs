@@ -67,8 +67,7 @@ impl NamedDigits {
         self.0.iter().flatten().map(|&(node, _)| node)
     }
 
-    /// Adds the joints of digits that lack some, unless others of the digit are other nodes than names say. Gives the fingers of
-    /// which it is not clear which joints they are.
+    /// Adds the joints of digits that lack some, unless others are other nodes than names say. Gives the fingers that are unclear.
     pub(super) fn complete(
         &self,
         model: &Model,

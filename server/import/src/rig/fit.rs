@@ -12,8 +12,7 @@ const FEWEST: usize = 12;
 
 /// How the vertices of a skin count.
 struct PadVertices {
-    /// Cosines to the pad's direction at which they start to count, and from which they count fully: the sides touch less often,
-    /// the nail hardly ever.
+    /// Cosines to the pad's direction at which they start to count, and from which they count fully.
     cosines: [f32; 2],
     /// Most vertices that are compared.
     most: usize,
@@ -59,12 +58,10 @@ impl PadVertices {
     }
 }
 
-/// Shares of the first link's length before which the skin is that of the palm, and of the last link's beyond which it is that of
-/// the tip.
+/// Shares of the first link before which the skin is the palm's, and of the last link beyond which it is the tip's.
 const ENDS: [f32; 2] = [0.3, 0.85];
 
-/// Share of its distance from the bones that the skin is on the pads' side of them, from which bones lie near the back: those of
-/// the built-in hands have 0.1, and those of hands that this is for 0.3 to 0.6.
+/// Share of its distance from the bones that the skin is on the pads' side: the built-in hands have 0.1, others 0.3 to 0.6.
 const NEAR_BACK: f32 = 0.2;
 
 /// Smallest and largest radius as a multiple of the measured one.
@@ -180,8 +177,7 @@ impl Links {
     }
 }
 
-/// How a last link is fitted, with the ranges: its slopes toward the pad and to the side, and the radius of the tip as a multiple of
-/// the measured one.
+/// Ranges of a last link's slopes toward the pad and to the side, and of the tip's radius as a multiple of the measured one.
 const TIP_RANGES: [[f32; 2]; 3] = [[-0.3, 0.3], [-0.15, 0.15], [0.6, 1.4]];
 
 /// Share of the link's length from which vertices count: nearer to the joint, the skin is also that of the link before.

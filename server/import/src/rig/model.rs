@@ -101,8 +101,7 @@ pub(super) struct BindPose<'a> {
 }
 
 impl<'a> BindPose<'a> {
-    /// The bind pose of a hand with these joints, in which the wrist is where the scene has it. `is_of_hand` tells the nodes
-    /// whose vertices are the hand's.
+    /// The bind pose of a hand, whose wrist is where the scene has it; `is_of_hand` tells the nodes whose vertices are the hand's.
     pub(super) fn new(
         model: &'a Model,
         joints: &[Option<usize>],

@@ -99,8 +99,7 @@ fn number(word: &str) -> Option<u8> {
     }
 }
 
-/// The digit and the bone's number of what follows "Finger" in names of 3ds Max's Biped: 0 to 4, and from the second bone on its
-/// number less one.
+/// The digit and the bone's number after "Finger" in names of Biped: 0 to 4, and from the second bone on its number less one.
 fn biped(word: &str) -> Option<(Digit, u8)> {
     let (digit, bone) = match word.as_bytes() {
         [digit] => (digit, 1),
@@ -210,12 +209,5 @@ mod tests {
         {
             assert_eq!(read(other), None, "{other}");
         }
-    }
-
-    #[test]
-    fn joints_are_named_in_any_spelling() {
-        assert_eq!(joint_named("index-finger-phalanx-proximal"), Some(7));
-        assert_eq!(joint_named("IndexFingerPhalanxProximal"), Some(7));
-        assert_eq!(joint_named("index"), None);
     }
 }

@@ -23,8 +23,7 @@ const FEWEST: usize = 60;
 /// Most vertices that are compared.
 const MAX_VERTICES: usize = 600;
 
-/// Distance in metres, at an adult's size, within which nine in ten of the palmar vertices are when the flesh of the built-in hands
-/// is as good: it fits their skin that well, in several poses.
+/// Distance in metres, at an adult's size, within which nine in ten palmar vertices of the built-in hands are.
 const AS_FITTED: f32 = 0.0018;
 
 /// Distances in metres beyond which a vertex counts no more than at it: wrinkles, strays, and what follows the wrist elsewhere.
@@ -45,8 +44,7 @@ const ROUNDS: usize = 4;
 /// Least radius of a solid, in metres at an adult's size.
 const MIN_RADIUS: f32 = 0.002;
 
-/// The flesh of a right hand's palm; `None` if too few vertices show it. `joints` are the joints where the skin is bound, in the frame
-/// of the wrist, as the skin's vertices are.
+/// The flesh of a right hand's palm; `None` if too few vertices show it. `joints` are those where the skin is bound.
 pub(super) fn flesh(
     rig: &Rig,
     size: f32,

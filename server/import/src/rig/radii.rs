@@ -211,8 +211,7 @@ impl Widths {
     }
 }
 
-/// The radius of the sphere that ends a last bone: the solid between it, one radius before the tip, and the joint with its
-/// radius lies on the skin in the median.
+/// The radius of the sphere that ends a last bone: the solid between it and the joint lies on the skin in the median.
 fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_joint: f32) -> Option<f32> {
     let axis = (end - start).normalize_or(Vec3::Y);
     let length = start.distance(end);
@@ -234,8 +233,7 @@ fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_
     Some(radius)
 }
 
-/// Where the skin of the last bone ends along the line from its joint to where its end is expected; `None` if too few vertices follow
-/// it.
+/// Where the skin of the last bone ends toward the expected end; `None` if too few vertices follow it.
 fn skin_end(vertices: impl Iterator<Item = Vec3>, start: Vec3, expected: Vec3) -> Option<Vec3> {
     let bone = expected - start;
     let (direction, length) = (bone.normalize_or(Vec3::Y), bone.length());

@@ -23,8 +23,7 @@ use crate::error::Violations;
 /// Smallest and largest length of a bone, in metres: from a doll's to a giant's.
 const BONE_RANGE: [f32; 2] = [0.002, 0.25];
 
-/// Smallest shares of the palm's breadth by which the thumb's first and second joint must be on the index finger's side of the
-/// palm's middle. The built-in hands have 0.4 and 0.8.
+/// Least shares of the palm's breadth that the thumb's first two joints are on the index finger's side; hands have 0.4 and 0.8.
 const THUMB_BESIDE: [f32; 2] = [-0.1, 0.2];
 
 /// Diameter of the thumb's first link relative to its second joint's, as in the built-in rigs.
@@ -309,8 +308,7 @@ impl Skeleton {
         rig
     }
 
-    /// The radii of the joints. The knuckle and the metacarpal of a missing finger are as thick as its neighbours', and its other
-    /// joints have no radius.
+    /// The radii of the joints; of a missing finger, those of knuckle and metacarpal are its neighbours', and the others 0.
     fn radii(&self, widths: &Widths) -> [f32; JOINT_COUNT] {
         let mut radii = widths.radii;
         let [_, fingers @ ..] = self.has;
@@ -328,8 +326,7 @@ impl Skeleton {
     }
 }
 
-/// The orientation of a finger's base: the reference's or, if the bone at rest is beyond its sideways limits, turned until it is
-/// at the nearer one, so that widely spread fingers stay apart.
+/// The orientation of a finger's base: the reference's, turned until the bone at rest is within its sideways limits.
 fn within_reach(chain: &DigitRig, limits: &DigitLimits, direction: Vec3) -> Quat {
     let orientation = chain.wrist_from_base.orientation;
     let yaw = yaw_of(chain, direction);
