@@ -83,12 +83,10 @@ pub(crate) fn foreign(bytes: &[u8], text: &[u8]) -> Option<ImportError> {
     }
     let known = |bytes: &[u8]| {
         let bytes = bytes.trim_ascii_start();
-        let own = |mark: &[u8]| {
-            bytes
-                .get(..mark.len())
-                .is_some_and(|start| start.eq_ignore_ascii_case(mark))
-        };
-        FOREIGN.iter().find(|(mark, _)| own(mark))
+        FOREIGN.iter().find(|(mark, _)| {
+            let start = bytes.get(..mark.len());
+            start.is_some_and(|start| start.eq_ignore_ascii_case(mark))
+        })
     };
     let format = known(bytes).or_else(|| known(text));
     let is_foreign = match format {
@@ -111,10 +109,6 @@ pub(crate) fn foreign(bytes: &[u8], text: &[u8]) -> Option<ImportError> {
             "{begin}; this looks like {looks_like}: a mesh is required as GLB, glTF, OBJ, PLY or STL"
         )));
     }
-    (count == 0).then(|| {
-        ImportError::Whole(
-            "the file is empty or has only blank lines and comments; a mesh is required as GLB, glTF, OBJ, PLY or STL"
-                .to_owned(),
-        )
-    })
+    let what = "the file is empty or has only blank lines and comments; a mesh is required as GLB, glTF, OBJ, PLY or STL";
+    (count == 0).then(|| ImportError::Whole(what.to_owned()))
 }

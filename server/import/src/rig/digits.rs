@@ -77,13 +77,14 @@ impl NamedDigits {
         let lacks =
             |digit: usize| joints_of(digit).any(|joint| is_required(joint) && joints[joint].is_none());
         let lacking = [0, 1, 2, 3, 4].map(lacks);
-        let numbered: Vec<(usize, Numbered)> = (0..5)
-            .filter(|&digit| lacking[digit] && !self.is_in_words(digit))
-            .map(|digit| (digit, self.numbered(model, digit)))
-            .collect();
+        let mut numbered: Vec<(usize, Numbered)> = Vec::new();
         let mut named = [None; JOINT_COUNT];
-        for digit in (0..5).filter(|&digit| lacking[digit] && self.is_in_words(digit)) {
-            self.by_words(digit, &mut named);
+        for digit in (0..5).filter(|&digit| lacking[digit]) {
+            if self.is_in_words(digit) {
+                self.by_words(digit, &mut named);
+            } else {
+                numbered.push((digit, self.numbered(model, digit)));
+            }
         }
         let fingers = numbered.iter().filter(|(digit, _)| *digit > 0);
         let starts_in_palm = starts_in_palm(model, wrist, fingers.map(|(_, bones)| bones));

@@ -38,13 +38,12 @@ impl PadVertices {
         let every = vertices.len().div_ceil(self.most).max(1);
         let [least, most] = self.cosines;
         let sample = vertices.iter().step_by(every);
-        sample
-            .filter_map(|&vertex| {
-                let (across, pad) = across(vertex)?;
-                let weight = ((across.dot(pad) - least) / (most - least)).clamp(0.0, 1.0);
-                (weight > 0.0).then_some((vertex, weight))
-            })
-            .collect()
+        let weighted = sample.filter_map(|&vertex| {
+            let (across, pad) = across(vertex)?;
+            let weight = ((across.dot(pad) - least) / (most - least)).clamp(0.0, 1.0);
+            (weight > 0.0).then_some((vertex, weight))
+        });
+        weighted.collect()
     }
 
     /// The sum of the squared distances of vertices from the surface of solids.

@@ -78,13 +78,11 @@ pub(super) fn check_digits(side: Handedness, has: [bool; 5], violations: &mut Vi
     let missing = missing_fingers(has);
     if missing.len() > 4 - FEWEST_FINGERS {
         let missing = missing.join(", ");
-        violations.add(
-            hand_name(side),
-            format!(
-                "lacks the {missing}; a hand must have a thumb and at least {FEWEST_FINGERS} fingers, because objects turn between \
-                 two digits. If they are there under other names, give them in joint_map"
-            ),
+        let what = format!(
+            "lacks the {missing}; a hand must have a thumb and at least {FEWEST_FINGERS} fingers, because objects turn between two \
+             digits. If they are there under other names, give them in joint_map"
         );
+        violations.add(hand_name(side), what);
     }
 }
 
@@ -295,14 +293,13 @@ fn check_unknown_fingers(model: &Model, hand: &HandNodes, has: [bool; 5], violat
     let unknown = unknown.map(|node| format!("{:?}", shortened(&model.names[node])));
     let unknown: Vec<String> = unknown.take(8).collect();
     if !unknown.is_empty() {
-        violations.add(
-            format!("{}, {}", hand_name(hand.side), missing.join(" and ")),
-            format!(
-                "has no nodes with its names, but there are unknown bones below the wrist: {}; if they are its joints, say which in \
-                 joint_map, and if not, take them out of the skin",
-                unknown.join(", ")
-            ),
+        let place = format!("{}, {}", hand_name(hand.side), missing.join(" and "));
+        let what = format!(
+            "has no nodes with its names, but there are unknown bones below the wrist: {}; if they are its joints, say which in \
+             joint_map, and if not, take them out of the skin",
+            unknown.join(", ")
         );
+        violations.add(place, what);
     }
 }
 

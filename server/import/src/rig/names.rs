@@ -149,10 +149,8 @@ pub(super) fn vrm_hands(json: &[u8], model: &Model) -> Result<Option<[HandNodes;
         // Metacarpal, proximal and distal since 1.0; of the older names, only these two can mean something else.
         let is_old = has("ThumbIntermediate") && !has("ThumbMetacarpal");
         for (bone, &node) in bones.iter().filter(|&(_, &node)| node < model.names.len()) {
-            let joint = bone
-                .strip_prefix(prefix)
-                .and_then(|bone| joint_of_bone(bone, is_old));
-            if let Some(joint) = joint {
+            let part = bone.strip_prefix(prefix);
+            if let Some(joint) = part.and_then(|part| joint_of_bone(part, is_old)) {
                 hand.joints[joint] = Some(node);
             }
         }
@@ -165,11 +163,10 @@ fn joint_of_bone(part: &str, is_old: bool) -> Option<usize> {
     if part == "Hand" {
         return Some(index::WRIST);
     }
-    let digits = ["Thumb", "Index", "Middle", "Ring", "Little"];
-    let (digit, bone) = digits
-        .iter()
-        .enumerate()
-        .find_map(|(digit, name)| Some((digit, part.strip_prefix(name)?)))?;
+    let mut digits = ["Thumb", "Index", "Middle", "Ring", "Little"]
+        .into_iter()
+        .enumerate();
+    let (digit, bone) = digits.find_map(|(digit, name)| Some((digit, part.strip_prefix(name)?)))?;
     let bones = if digit == 0 && !is_old {
         ["Metacarpal", "Proximal", "Distal"]
     } else {

@@ -215,12 +215,13 @@ impl Widths {
 fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_joint: f32) -> Option<f32> {
     let axis = (end - start).normalize_or(Vec3::Y);
     let length = start.distance(end);
-    let around: Vec<(f32, f32)> = vertices
-        .map(|vertex| {
-            let along = (vertex - start).dot(axis);
-            (along, (vertex - start).reject_from_normalized(axis).length())
-        })
-        .filter(|(along, _)| (TIP_BAND[0] * length..TIP_BAND[1] * length).contains(along))
+    let band = TIP_BAND.map(|share| share * length);
+    let around = vertices.map(|vertex| {
+        let offset = vertex - start;
+        (offset.dot(axis), offset.reject_from_normalized(axis).length())
+    });
+    let around: Vec<(f32, f32)> = around
+        .filter(|(along, _)| (band[0]..band[1]).contains(along))
         .collect();
     let mut radius = TIP_SHARE * at_joint;
     for _ in 0..4 {

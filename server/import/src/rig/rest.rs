@@ -68,7 +68,7 @@ fn neighbours(has: [bool; 4], finger: usize) -> Option<Neighbours> {
     Some(Neighbours { before, after, share })
 }
 
-/// A bone's ends as `OpenXR` indices.
+/// Bones' ends as `OpenXR` indices.
 fn bones() -> impl Iterator<Item = (usize, usize)> {
     (0..5).map(base_of).flat_map(|base| {
         let links = (base..base + 3).map(|joint| (joint, joint + 1));
