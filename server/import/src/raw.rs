@@ -57,8 +57,8 @@ pub(crate) struct RawMesh {
 impl RawMesh {
     pub(crate) fn new(name: &'static str, places: Places) -> Self {
         Self {
-            name,
             places,
+            name,
             ..Self::default()
         }
     }
