@@ -2,7 +2,7 @@
 
 use grasp_synthesis::base::stop::{Stop, Stopped};
 
-use crate::raw::Occurrences;
+use crate::raw::{Oddities, Oddity};
 
 /// One triangle's use of an edge, in four bytes: a mesh has three per triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,31 +97,16 @@ impl Sets {
     }
 }
 
-/// Edges by how the triangles at them join; the first of a kind is that of the first triangle.
-#[derive(Debug, Default)]
-pub(crate) struct Edges {
-    /// Edges of a single triangle.
-    pub(crate) open: Occurrences,
-    /// Edges of two triangles with opposite windings.
-    pub(crate) inconsistent: Occurrences,
-    /// Edges of more than two triangles.
-    pub(crate) crowded: Occurrences,
-}
-
-impl Edges {
-    /// Counts edges by their uses.
-    pub(crate) fn of(uses: &[EdgeUse]) -> Self {
-        let mut edges = Self::default();
-        for users in by_edge(uses) {
-            let first = users[0].triangle();
-            match users {
-                [_] => edges.open.note(first),
-                [a, b] if a.direction() == b.direction() => edges.inconsistent.note(first),
-                [_, _] => {}
-                _ => edges.crowded.note(first),
-            }
-        }
-        edges
+/// Notes edges at which other than two triangles with the same winding join, each with its first triangle.
+pub(crate) fn note_odd(uses: &[EdgeUse], oddities: &mut Oddities) {
+    for users in by_edge(uses) {
+        let oddity = match users {
+            [_] => Oddity::OpenEdge,
+            [a, b] if a.direction() == b.direction() => Oddity::InconsistentEdge,
+            [_, _] => continue,
+            _ => Oddity::CrowdedEdge,
+        };
+        oddities.note(oddity, users[0].triangle());
     }
 }
 
@@ -147,19 +132,6 @@ pub(crate) struct Doubles {
     pub(crate) uses: Vec<EdgeUse>,
     /// Whether each triangle is dropped, those without area included.
     pub(crate) is_dropped: Vec<bool>,
-    /// Triangles that repeat an earlier one, with its winding.
-    pub(crate) repeated: Occurrences,
-    /// Triangles that repeat an earlier one with the opposite winding and were dropped.
-    pub(crate) two_sided: Occurrences,
-    /// Those that were kept: the rest of the surface is closed without either.
-    pub(crate) undecided: Occurrences,
-}
-
-/// Two triangles of the same corners and opposite windings.
-#[derive(Clone, Copy, Debug)]
-struct Pair {
-    earlier: u32,
-    later: u32,
 }
 
 impl Doubles {
@@ -168,23 +140,28 @@ impl Doubles {
     ///
     /// One side is kept of a patch of pairs that the rest of the surface needs to be closed, and of a sheet that touches
     /// nothing else. Which of the two it is does not matter: the winding is repaired later.
-    pub(crate) fn of(triangles: &[[u32; 3]], is_dropped: Vec<bool>, stop: Stop<'_>) -> Result<Self, Stopped> {
+    pub(crate) fn of(
+        triangles: &[[u32; 3]],
+        is_dropped: Vec<bool>,
+        oddities: &mut Oddities,
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
         let mut doubles = Self {
             is_dropped,
             ..Self::default()
         };
-        let pairs = doubles.drop_repeated(triangles);
+        let pairs = doubles.drop_repeated(triangles, oddities);
         stop.check()?;
         doubles.uses = edge_uses(triangles, &doubles.is_dropped);
         if !pairs.is_empty() {
-            doubles.drop_sides(&pairs);
+            doubles.drop_sides(&pairs, oddities);
         }
         stop.check()?;
         Ok(doubles)
     }
 
-    /// Drops triangles that repeat earlier ones; returns the pairs among the rest.
-    fn drop_repeated(&mut self, triangles: &[[u32; 3]]) -> Vec<Pair> {
+    /// Drops triangles that repeat earlier ones; returns the pairs of opposite windings among the rest, the earlier one first.
+    fn drop_repeated(&mut self, triangles: &[[u32; 3]], oddities: &mut Oddities) -> Vec<[u32; 2]> {
         let mut sorted = Vec::with_capacity(triangles.len());
         for ((&corners, &is_dropped), triangle) in triangles.iter().zip(&self.is_dropped).zip(0_u32..) {
             if !is_dropped {
@@ -203,24 +180,22 @@ impl Doubles {
                 if is_opposite && opposite.is_none() {
                     opposite = Some(other);
                 } else {
-                    self.repeated.note(other as usize);
+                    oddities.note(Oddity::Repeated, other as usize);
                     self.is_dropped[other as usize] = true;
                 }
             }
-            pairs.extend(opposite.map(|later| Pair {
-                earlier: first,
-                later,
-            }));
+            pairs.extend(opposite.map(|later| [first, later]));
         }
         pairs
     }
 
-    fn drop_sides(&mut self, pairs: &[Pair]) {
+    fn drop_sides(&mut self, pairs: &[[u32; 2]], oddities: &mut Oddities) {
         const UNPAIRED: u32 = u32::MAX;
         let mut pair_of = vec![UNPAIRED; self.is_dropped.len()];
-        for (pair, &Pair { earlier, later }) in (0..).zip(pairs) {
-            pair_of[earlier as usize] = pair;
-            pair_of[later as usize] = pair;
+        for (pair, triangles) in (0..).zip(pairs) {
+            for &triangle in triangles {
+                pair_of[triangle as usize] = pair;
+            }
         }
         // Patches of pairs that share edges, and how the rest of the surface is there.
         let mut patches = Sets::new(pairs.len());
@@ -244,12 +219,12 @@ impl Doubles {
             closes[root] |= closes[pair];
             is_spare[root] |= is_spare[pair];
         }
-        for (pair, &Pair { later, .. }) in (0..).zip(pairs) {
+        for (pair, &[_, later]) in (0..).zip(pairs) {
             let root = patches.root(pair);
             if is_spare[root] && !closes[root] {
-                self.undecided.note(later as usize);
+                oddities.note(Oddity::Undecided, later as usize);
             } else {
-                self.two_sided.note(later as usize);
+                oddities.note(Oddity::TwoSided, later as usize);
                 self.is_dropped[later as usize] = true;
             }
         }

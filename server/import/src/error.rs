@@ -21,17 +21,6 @@ pub enum ImportError {
     /// Something is wrong with the file as a whole.
     #[error("{0}")]
     Whole(String),
-    /// No triangle is left.
-    #[error(
-        "the mesh has no triangles; {dropped} points, lines and faces without area and {unknown} lines with an unknown \
-         keyword were ignored"
-    )]
-    Empty {
-        /// Number of points, lines and faces without area.
-        dropped: usize,
-        /// Number of lines that start with an unknown keyword.
-        unknown: usize,
-    },
     /// A part that is to be read is none of the file.
     #[error("is {}, {what}", quoted(.name))]
     NoSuchPart {
@@ -86,7 +75,7 @@ pub(crate) fn check_count(place: &str, what: &str, found: u64, limit: usize) -> 
 /// A bounded list of violations.
 #[derive(Debug, Default)]
 pub(crate) struct Violations {
-    pub(crate) listed: Vec<ImportError>,
+    listed: Vec<ImportError>,
     more: usize,
 }
 
@@ -109,16 +98,24 @@ impl Violations {
         self.listed.len() + self.more
     }
 
-    pub(crate) fn into_errors(mut self) -> Vec<ImportError> {
-        if self.more > 0 {
-            self.listed.push(ImportError::More(self.more));
-        }
-        self.listed
-    }
-
     /// Fails if there is a violation.
     pub(crate) fn into_result(self) -> Result<(), Self> {
         if self.len() == 0 { Ok(()) } else { Err(self) }
+    }
+}
+
+impl From<Violations> for Vec<ImportError> {
+    fn from(Violations { mut listed, more }: Violations) -> Self {
+        if more > 0 {
+            listed.push(ImportError::More(more));
+        }
+        listed
+    }
+}
+
+impl From<ImportError> for Vec<ImportError> {
+    fn from(error: ImportError) -> Self {
+        vec![error]
     }
 }
 

@@ -1,9 +1,9 @@
 //! Recognises the format of a mesh by its content, and what bytes are that are no mesh.
 
 use crate::{
-    error::{ImportError, Violations},
+    error::ImportError,
     stl,
-    text::{is_statement, lines, without_mark, words},
+    text::{is_statement, lines, split_words, without_mark, words},
 };
 
 /// Bytes at the start that are searched for a format's marks.
@@ -34,7 +34,7 @@ impl Format {
         let start = text[..text.len().min(SEARCHED_BYTES)].trim_ascii_start();
         let mut first_words = start
             .split(|&byte| matches!(byte, b'\n' | b'\r'))
-            .filter_map(|line| line.split(u8::is_ascii_whitespace).find(|word| !word.is_empty()))
+            .filter_map(|line| split_words(line).next())
             .map(<[u8]>::to_ascii_lowercase);
         let mut word = || first_words.next().unwrap_or_default();
         match (word().as_slice(), word().as_slice()) {
@@ -43,28 +43,6 @@ impl Format {
             _ if start.starts_with(b"{") && text.windows(7).any(|part| part == b"\"asset\"") => Self::Gltf,
             _ => Self::Obj,
         }
-    }
-
-    /// Errors that say of which format an empty mesh is, since its file may be of another one than its sender believes, and what
-    /// the reader noted.
-    pub(crate) fn named(self, mut errors: Violations, notes: &[String]) -> Violations {
-        let place = match self {
-            Self::Obj => return errors,
-            Self::StlText | Self::StlBinary => "the STL mesh",
-            Self::Ply => "the PLY mesh",
-            Self::Gltf => "the glTF scene",
-        };
-        for error in &mut errors.listed {
-            if let ImportError::Empty { dropped, .. } = error {
-                let mut what = vec!["has no triangles".to_owned()];
-                if *dropped > 0 {
-                    what.push(format!("{dropped} faces without area were ignored"));
-                }
-                what.extend_from_slice(notes);
-                *error = ImportError::at(place, what.join("; "));
-            }
-        }
-        errors
     }
 }
 
@@ -105,12 +83,10 @@ pub(crate) fn foreign(bytes: &[u8], text: &[u8]) -> Option<ImportError> {
     }
     let known = |bytes: &[u8]| {
         let bytes = bytes.trim_ascii_start();
-        let own = |mark: &[u8]| {
-            bytes
-                .get(..mark.len())
-                .is_some_and(|start| start.eq_ignore_ascii_case(mark))
-        };
-        FOREIGN.iter().find(|(mark, _)| own(mark))
+        FOREIGN.iter().find(|(mark, _)| {
+            let start = bytes.get(..mark.len());
+            start.is_some_and(|start| start.eq_ignore_ascii_case(mark))
+        })
     };
     let format = known(bytes).or_else(|| known(text));
     let is_foreign = match format {
@@ -133,10 +109,6 @@ pub(crate) fn foreign(bytes: &[u8], text: &[u8]) -> Option<ImportError> {
             "{begin}; this looks like {looks_like}: a mesh is required as GLB, glTF, OBJ, PLY or STL"
         )));
     }
-    (count == 0).then(|| {
-        ImportError::Whole(
-            "the file is empty or has only blank lines and comments; a mesh is required as GLB, glTF, OBJ, PLY or STL"
-                .to_owned(),
-        )
-    })
+    let what = "the file is empty or has only blank lines and comments; a mesh is required as GLB, glTF, OBJ, PLY or STL";
+    (count == 0).then(|| ImportError::Whole(what.to_owned()))
 }

@@ -36,13 +36,12 @@ pub use rig::{
     read_rig, rig_at_rest,
 };
 
-use error::{Violations, check_count};
+use error::check_count;
 use format::Format;
 use raw::{Places, RawMesh, check_counts};
 use repair::repair;
 
-/// Largest distance of a vertex from the file's origin along an axis, in metres. Farther out, even double precision has steps of
-/// more than a tenth of a micrometre.
+/// Largest distance of a vertex from the file's origin along an axis, in metres, where double precision has steps of 0.1 µm.
 const MAX_COORDINATE_METRES: f64 = 1e9;
 
 /// The largest file that a reader accepts.
@@ -156,7 +155,7 @@ pub fn mesh_of_triangles(
     positions: impl IntoIterator<Item = Vec3>,
     corners: &[[u32; 3]],
 ) -> Result<ImportedMesh, Vec<ImportError>> {
-    let mut raw = RawMesh::new(Places::Triangles);
+    let mut raw = RawMesh::new("", Places::Triangles);
     raw.positions.extend(positions.into_iter().map(Vec3::as_dvec3));
     let names = raw.names.add_part("");
     let vertices = raw.positions.len();
@@ -169,9 +168,8 @@ pub fn mesh_of_triangles(
         }
         raw.add_triangle(corners, place, names);
     }
-    raw.check_coordinates(1.0)
-        .and_then(|()| repair(raw, Import::METRES, DVec3::ZERO, Stop::NEVER))
-        .map_err(Violations::into_errors)
+    raw.check_coordinates(1.0)?;
+    Ok(repair(raw, Import::METRES, DVec3::ZERO, Stop::NEVER)?)
 }
 
 /// As [`read_mesh`], unless it is stopped, and only parts with one of some names, if there are any.
@@ -185,39 +183,23 @@ pub fn read_mesh_until(
     limits: MeshLimits,
     stop: Stop<'_>,
 ) -> Result<ImportedMesh, Vec<ImportError>> {
-    read(bytes, import, parts, limits, stop).map_err(Violations::into_errors)
-}
-
-fn read(
-    bytes: &[u8],
-    import: Import,
-    parts: &[String],
-    limits: MeshLimits,
-    stop: Stop<'_>,
-) -> Result<ImportedMesh, Violations> {
     let unit = import.unit_metres;
     if !(unit.is_finite() && unit > 0.0) {
         let what = format!("a unit of {unit} m cannot be used; it must be finite and more than 0");
         return Err(ImportError::Whole(what).into());
     }
     check_count("the file", "bytes", bytes.len() as u64, limits.bytes)?;
-    let format = Format::of(bytes);
-    let mut raw = match format {
+    let mut raw = match Format::of(bytes) {
         Format::Obj => obj::read(bytes, unit, limits, stop)?,
         Format::StlText => stl::read_text(bytes, limits, stop)?,
         Format::StlBinary => stl::read_binary(bytes, limits, stop)?,
         Format::Ply => ply::read(bytes, limits.unwelded(), stop)?,
         Format::Gltf => gltf::read(bytes, limits.unwelded(), stop)?,
     };
-    let left = parts::leave_out(&mut raw, parts)?;
+    parts::leave_out(&mut raw, parts)?;
     raw.check_coordinates(f64::from(unit))?;
     let origin_in_file = raw.recentre(import);
-    let notes = raw.warnings.clone();
-    let mut read =
-        repair(raw, import, origin_in_file, stop).map_err(|errors| format.named(errors, &notes))?;
-    if let Some(left) = left {
-        left.count_as_in_file(&mut read);
-    }
+    let read = repair(raw, import, origin_in_file, stop)?;
     check_counts(read.mesh.positions().len() as u64, 0, limits)?;
     Ok(read)
 }

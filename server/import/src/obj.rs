@@ -15,7 +15,7 @@ use crate::{
     error::{ImportError, Violations},
     format::foreign,
     parts::FaceNames,
-    raw::{Occurrences, RawFace, RawMesh, too_far},
+    raw::{Occurrences, Oddity, RawMesh, too_far},
     text::{decode, lines, not_finite, number, parsed, shown, words},
 };
 
@@ -29,8 +29,6 @@ const FACES_PER_PIECE: usize = 512;
 const LINES_PER_CHECK: usize = 1024;
 
 /// Reads OBJ text, in UTF-8 or UTF-16; `unit_metres` is the length of one unit.
-///
-/// Colours, normals and texture coordinates are ignored, and no material file is opened.
 pub(crate) fn read(
     bytes: &[u8],
     unit_metres: f32,
@@ -38,23 +36,15 @@ pub(crate) fn read(
     stop: Stop<'_>,
 ) -> Result<RawMesh, Violations> {
     let (text, warning) = decode(bytes);
-    let mut raw = Scanner::new(unit_metres, limits)
-        .read(&text, stop)
+    let mut raw = Scanner::default()
+        .read(&text, unit_metres, limits, stop)
         .map_err(|errors| foreign(bytes, &text).map_or(errors, Violations::from))?;
     raw.warnings.extend(warning);
     Ok(raw)
 }
 
-/// A corner that refers to a vertex further down.
-struct ForwardCorner {
-    line: usize,
-    /// Counted from 1.
-    index: i64,
-}
-
+#[derive(Default)]
 struct Scanner {
-    unit_metres: f32,
-    limits: MeshLimits,
     raw: RawMesh,
     /// The vertices for `tobj`, each of 3 or 4 numbers.
     vertices: String,
@@ -69,40 +59,27 @@ struct Scanner {
     coloured: Occurrences,
     /// Vertices with a weight other than 1.
     weighted: Occurrences,
-    forward: Vec<ForwardCorner>,
+    /// The lines of corners that refer to vertices further down, and the indices of these, counted from 1.
+    forward: Vec<(usize, i64)>,
     groups: Vec<u32>,
     object: Option<u32>,
     material: Option<u32>,
     /// The set of these names; `None` if no face has had them yet.
-    names: Option<usize>,
+    names: Option<u32>,
 }
 
 impl Scanner {
-    fn new(unit_metres: f32, limits: MeshLimits) -> Self {
-        Self {
-            unit_metres,
-            limits,
-            raw: RawMesh::default(),
-            vertices: String::new(),
-            faces: String::new(),
-            piece: 0,
-            is_used: Vec::new(),
-            violations: Violations::default(),
-            coloured: Occurrences::default(),
-            weighted: Occurrences::default(),
-            forward: Vec::new(),
-            groups: Vec::new(),
-            object: None,
-            material: None,
-            names: None,
-        }
-    }
-
     /// Reads the text; allocates in proportion to what was read within the limits.
-    fn read(mut self, text: &[u8], stop: Stop<'_>) -> Result<RawMesh, Violations> {
+    fn read(
+        mut self,
+        text: &[u8],
+        unit_metres: f32,
+        limits: MeshLimits,
+        stop: Stop<'_>,
+    ) -> Result<RawMesh, Violations> {
         for (number, line) in lines(text) {
             stop.check_every(LINES_PER_CHECK, number)?;
-            if let Err(over_limit) = self.line(number, &line) {
+            if let Err(over_limit) = self.line(number, &line, unit_metres, limits) {
                 // The rest of the text is unknown.
                 self.violations.push(over_limit);
                 self.forward.clear();
@@ -113,21 +90,35 @@ impl Scanner {
     }
 
     /// Reads a line; fails if a limit is exceeded.
-    fn line(&mut self, number: usize, line: &[u8]) -> Result<(), ImportError> {
+    fn line(
+        &mut self,
+        number: usize,
+        line: &[u8],
+        unit_metres: f32,
+        limits: MeshLimits,
+    ) -> Result<(), ImportError> {
         let mut words = words(line);
         let Some(keyword) = words.next() else {
             return Ok(());
         };
         match keyword {
-            b"v" => self.vertex(number, &words.collect::<Vec<_>>())?,
-            b"f" => self.face(number, words)?,
-            b"p" | b"l" => self.raw.without_area.note(number),
+            b"v" if self.is_used.len() == limits.vertices => {
+                let what = format!("the mesh has more than {} vertices", limits.vertices);
+                return Err(ImportError::on_line(number, what));
+            }
+            b"v" => {
+                self.is_used.push(false);
+                let read = self.position(number, &words.collect::<Vec<_>>(), unit_metres);
+                read.unwrap_or_else(|wrong| self.violations.push(wrong));
+            }
+            b"f" => self.face(number, words, limits.triangles)?,
+            b"p" | b"l" => self.raw.oddities.note(Oddity::FewCorners, number),
             b"g" => self.groups(number, words),
             b"o" => self.object = self.rest_of_line(line, keyword),
             b"usemtl" => self.material = self.rest_of_line(line, keyword),
             // Appearance only.
             b"vt" | b"vn" | b"vp" | b"s" | b"mtllib" => {}
-            _ => self.raw.unknown.note(number),
+            _ => self.raw.oddities.note(Oddity::UnknownLine, number),
         }
         if matches!(keyword, b"g" | b"o" | b"usemtl") {
             self.names = None;
@@ -135,20 +126,7 @@ impl Scanner {
         Ok(())
     }
 
-    fn vertex(&mut self, line: usize, words: &[&[u8]]) -> Result<(), ImportError> {
-        let limit = self.limits.vertices;
-        if self.is_used.len() == limit {
-            let what = format!("the mesh has more than {limit} vertices");
-            return Err(ImportError::on_line(line, what));
-        }
-        self.is_used.push(false);
-        if let Err(wrong) = self.position(line, words) {
-            self.violations.push(wrong);
-        }
-        Ok(())
-    }
-
-    fn position(&mut self, line: usize, words: &[&[u8]]) -> Result<(), ImportError> {
+    fn position(&mut self, line: usize, words: &[&[u8]], unit_metres: f32) -> Result<(), ImportError> {
         // Three coordinates, then a weight or a colour, which is ignored. Of seven numbers, the last four are a colour with alpha,
         // as several programs write it: taken for a weight, its red would distort the mesh.
         let read = match words.len() {
@@ -170,7 +148,7 @@ impl Scanner {
             *value = number(line, word)?;
         }
         let [x, y, z, weight] = numbers;
-        let metres = (DVec3::new(x, y, z) / weight).abs().max_element() * f64::from(self.unit_metres);
+        let metres = (DVec3::new(x, y, z) / weight).abs().max_element() * f64::from(unit_metres);
         if weight == 0.0 || !metres.is_finite() {
             return Err(not_finite(line, words[read - 1]));
         }
@@ -190,22 +168,21 @@ impl Scanner {
         &mut self,
         line: usize,
         words: impl Iterator<Item = &'a [u8]> + Clone,
+        limit: usize,
     ) -> Result<(), ImportError> {
         let corners = words.clone().count();
         if corners < 3 {
-            self.raw.without_area.note(line);
+            self.raw.oddities.note(Oddity::FewCorners, line);
             return Ok(());
         }
-        let limit = self.limits.triangles;
-        if self.raw.faces.triangles() + corners - 2 > limit {
+        if self.raw.triangles + corners - 2 > limit {
             let what = format!("the mesh has more than {limit} triangles");
             return Err(ImportError::on_line(line, what));
         }
         self.faces.push('f');
         for word in words {
-            if let Err(wrong) = self.corner(line, word) {
-                self.violations.push(wrong);
-            }
+            let read = self.corner(line, word);
+            read.unwrap_or_else(|wrong| self.violations.push(wrong));
         }
         self.piece = (self.piece + 1) % FACES_PER_PIECE;
         self.faces.push_str(if self.piece == 0 { "\no\n" } else { "\n" });
@@ -216,11 +193,7 @@ impl Scanner {
                 ..FaceNames::default()
             })
         });
-        self.raw.faces.push(RawFace {
-            place: line,
-            corners,
-            names,
-        });
+        self.raw.add_face(corners, line, names);
         Ok(())
     }
 
@@ -240,7 +213,7 @@ impl Scanner {
         let vertex = vertex.ok_or_else(|| no_such_vertex(line, index, known))?;
         match self.is_used.get_mut(vertex) {
             Some(is_used) => *is_used = true,
-            None => self.forward.push(ForwardCorner { line, index }),
+            None => self.forward.push((line, index)),
         }
         // Writing to a string cannot fail.
         _ = write!(self.faces, " {}", vertex + 1);
@@ -265,7 +238,7 @@ impl Scanner {
 
     fn finish(mut self, stop: Stop<'_>) -> Result<RawMesh, Violations> {
         let known = self.is_used.len();
-        for ForwardCorner { line, index } in self.forward {
+        for (line, index) in self.forward {
             match self.is_used.get_mut(index as usize - 1) {
                 Some(is_used) => *is_used = true,
                 None => self.violations.push(no_such_vertex(line, index, known)),
@@ -273,27 +246,23 @@ impl Scanner {
         }
         self.violations.into_result()?;
         let mut raw = self.raw;
-        if raw.faces.triangles() == 0 {
-            return Err(raw.empty(0).into());
+        if raw.triangles == 0 {
+            return Err(raw.empty().into());
         }
         raw.unused_vertices = self.is_used.iter().filter(|is_used| !**is_used).count();
         (raw.positions, raw.corners) = parse(&self.vertices, &self.faces, stop)?;
-        for (oddity, what) in [
-            (
-                self.coloured,
-                "have seven numbers, read as x y z and a colour with alpha, not as x y z and a weight and a colour",
-            ),
-            (
-                self.weighted,
-                "have a weight other than 1, by which their coordinates were divided",
-            ),
-        ] {
-            let Occurrences { count, first } = oddity;
-            if count > 0 {
-                raw.warnings
-                    .push(format!("{count} vertices {what}; the first is on line {first}"));
-            }
-        }
+        let mut warn = |Occurrences { count, first }, what: &str| {
+            let warning = format!("{count} vertices {what}; the first is on line {first}");
+            raw.warnings.extend((count > 0).then_some(warning));
+        };
+        warn(
+            self.coloured,
+            "have seven numbers, read as x y z and a colour with alpha, not as x y z and a weight and a colour",
+        );
+        warn(
+            self.weighted,
+            "have a weight other than 1, by which their coordinates were divided",
+        );
         Ok(raw)
     }
 }

@@ -1,12 +1,8 @@
 //! Which parts of a file are the object.
 
-use std::{
-    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
-    ops::Range,
-};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use crate::{
-    ImportedMesh,
     error::{ImportError, Violations},
     part_names::Role,
     raw::RawMesh,
@@ -16,34 +12,12 @@ use crate::{
 const LISTED_NAMES: usize = 8;
 const SHOWN_CHARACTERS: usize = 64;
 
-/// The triangles of a file that are left, where some are not.
-#[derive(Debug)]
-pub(crate) struct Left {
-    /// Their indices in the file, ascending.
-    indices: Vec<u32>,
-    /// Number of triangles in the file.
-    all: usize,
-}
-
-impl Left {
-    /// Counts the triangles of a mesh that has only these as the file does.
-    pub(crate) fn count_as_in_file(&self, read: &mut ImportedMesh) {
-        for triangle in &mut read.indices_in_file {
-            *triangle = self.indices[*triangle as usize];
-        }
-        read.triangles_in_file = self.all;
-    }
-}
-
 /// Leaves out what is no part of the object: all that does not have one of the names in `requested` or, if there are none, what
-/// is invisible, colliders and other helpers, and lower levels of detail. Returns what is left, if anything was left out.
-///
-/// # Errors
-/// A requested name is none of the file, or nothing is left.
-pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Option<Left>, Violations> {
+/// is invisible, colliders and other helpers, and lower levels of detail.
+pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<(), Violations> {
     let mut triangles = vec![0; raw.names.sets.len()];
     for face in raw.faces.iter() {
-        triangles[face.names] += face.corners - 2;
+        triangles[face.names as usize] += face.corners as usize - 2;
     }
     let is_out: Vec<bool> = if requested.is_empty() {
         let asides = asides(&raw.names, &triangles);
@@ -59,8 +33,10 @@ pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Optio
         let is_wanted = |set| raw.names.all(set).any(|name| wanted.contains(&name));
         (0..raw.names.sets.len()).map(|set| !is_wanted(set)).collect()
     };
-    let is_needed = (0..is_out.len()).any(|set| is_out[set] && triangles[set] > 0);
-    Ok(is_needed.then(|| keep(raw, &is_out)))
+    if (0..is_out.len()).any(|set| is_out[set] && triangles[set] > 0) {
+        raw.keep(|face| !is_out[face.names as usize]);
+    }
+    Ok(())
 }
 
 /// The indices of requested names.
@@ -100,7 +76,7 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
     let all = names.names();
     let roles: Vec<Role> = all.iter().map(|name| Role::of(name, &mut index)).collect();
     let telling = |set: usize| {
-        let own = names.parts(set).iter().chain(&names.sets[set].role);
+        let own = names.sets[set].parts.iter().chain(&names.sets[set].role);
         own.map(|&name| roles[name as usize])
     };
     let mut asides: Vec<Option<Aside>> = names.sets.iter().map(|set| set.aside).collect();
@@ -159,7 +135,7 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
         let mut count = 0;
         for set in (0..names.sets.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
             count += triangles[set];
-            found.extend(names.parts(set).iter().map(|&name| all[name as usize]));
+            found.extend(names.sets[set].parts.iter().map(|&name| all[name as usize]));
         }
         if count > 0 {
             let found = if found.is_empty() {
@@ -194,31 +170,6 @@ pub(crate) fn quoted(name: &str) -> String {
     }
 }
 
-/// Keeps the faces of other sets, and their vertices.
-fn keep(raw: &mut RawMesh, is_out: &[bool]) -> Left {
-    let mut left = Left {
-        indices: Vec::new(),
-        all: raw.faces.triangles(),
-    };
-    let all = std::mem::take(&mut raw.faces);
-    let corners = std::mem::take(&mut raw.corners);
-    let mut rest = corners.as_slice();
-    let mut triangle = 0;
-    for face in all.iter() {
-        let (own, others) = rest.split_at(face.corners);
-        rest = others;
-        let triangles = triangle..triangle + face.corners as u32 - 2;
-        triangle = triangles.end;
-        if !is_out[face.names] {
-            left.indices.extend(triangles);
-            raw.faces.push(face);
-            raw.corners.extend(own);
-        }
-    }
-    raw.keep_used_vertices();
-    left
-}
-
 /// Why a part of a file is no part of the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Aside {
@@ -245,24 +196,12 @@ pub(crate) struct FaceNames {
     pub(crate) aside: Option<Aside>,
 }
 
-/// What faces share, as [`FaceNames`].
-#[derive(Clone, Debug)]
-struct NameSet {
-    /// A range of [`NameSets::parts`].
-    parts: Range<u32>,
-    material: Option<u32>,
-    role: Option<u32>,
-    aside: Option<Aside>,
-}
-
 /// Sets of names that faces share.
 #[derive(Debug, Default)]
 pub(crate) struct NameSets {
     /// The index of each name.
     indices: HashMap<String, u32>,
-    sets: Vec<NameSet>,
-    /// Indices of the names of parts, set after set.
-    parts: Vec<u32>,
+    sets: Vec<FaceNames>,
 }
 
 impl NameSets {
@@ -277,28 +216,15 @@ impl NameSets {
     }
 
     /// Adds a set; returns its index.
-    pub(crate) fn add(&mut self, names: FaceNames) -> usize {
-        let FaceNames {
-            mut parts,
-            material,
-            role,
-            aside,
-        } = names;
-        parts.sort_unstable();
-        parts.dedup();
-        let start = self.parts.len() as u32;
-        self.parts.extend(parts);
-        self.sets.push(NameSet {
-            parts: start..self.parts.len() as u32,
-            material,
-            role,
-            aside,
-        });
-        self.sets.len() - 1
+    pub(crate) fn add(&mut self, mut names: FaceNames) -> u32 {
+        names.parts.sort_unstable();
+        names.parts.dedup();
+        self.sets.push(names);
+        self.sets.len() as u32 - 1
     }
 
     /// Adds the set of a part with a name, which may be empty. Returns its index.
-    pub(crate) fn add_part(&mut self, name: &str) -> usize {
+    pub(crate) fn add_part(&mut self, name: &str) -> u32 {
         let named = (!name.is_empty()).then(|| self.intern(name));
         self.add(FaceNames {
             parts: named.into_iter().collect(),
@@ -306,16 +232,9 @@ impl NameSets {
         })
     }
 
-    /// The names of a set's parts, as indices.
-    fn parts(&self, set: usize) -> &[u32] {
-        let Range { start, end } = self.sets[set].parts;
-        &self.parts[start as usize..end as usize]
-    }
-
     /// All names of a set, as indices, each once.
     fn all(&self, set: usize) -> impl Iterator<Item = u32> {
-        let parts = self.parts(set);
-        let material = self.sets[set].material;
+        let FaceNames { parts, material, .. } = &self.sets[set];
         let material = material.filter(|material| !parts.contains(material));
         parts.iter().copied().chain(material)
     }
@@ -339,8 +258,8 @@ impl NameSets {
                 triangles.push(triangle as u32);
             }
         }
+        let groups = groups.into_iter();
         groups
-            .into_iter()
             .map(|(name, triangles)| (name.to_owned(), triangles))
             .collect()
     }

@@ -8,15 +8,12 @@ use grasp_synthesis::base::stop::Stop;
 use crate::{
     MeshLimits,
     error::{ImportError, Violations},
-    raw::{Places, RawFace, RawMesh, check_counts},
-    text::{cut, number, parsed, plain_lines, shown, without_mark, words},
+    raw::{Oddity, Places, RawMesh, check_counts},
+    text::{cut, number, parsed, plain_lines, shown, split_words, without_mark, words},
 };
 
 /// Elements read between two checks whether to stop.
 const ELEMENTS_PER_CHECK: usize = 1024;
-
-/// The names under which files list the vertices of a face.
-const INDEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// The names of coordinates.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -79,6 +76,12 @@ struct Property {
     scalar: Scalar,
 }
 
+impl Property {
+    fn is_of_indices(&self) -> bool {
+        matches!(self.name.as_str(), "vertex_indices" | "vertex_index")
+    }
+}
+
 #[derive(Debug)]
 struct Element {
     name: String,
@@ -87,15 +90,6 @@ struct Element {
 }
 
 impl Element {
-    /// The fewest bytes that one takes: in text, a digit and a separator for each property.
-    fn least_bytes(&self, encoding: Encoding) -> usize {
-        let sizes = self.properties.iter().map(|property| match encoding {
-            Encoding::Text => 2,
-            _ => property.length.unwrap_or(property.scalar).bytes(),
-        });
-        sizes.sum()
-    }
-
     fn cut_off(&self) -> ImportError {
         let Self { name, count, .. } = self;
         ImportError::at(
@@ -132,11 +126,7 @@ impl<'a> Header<'a> {
                 has_returns = before[line.len()..end] == *b"\r";
             }
             lines += 1;
-            let words: Vec<&[u8]> = line
-                .split(u8::is_ascii_whitespace)
-                .filter(|word| !word.is_empty())
-                .collect();
-            let is_understood = match words[..] {
+            let is_understood = match split_words(line).collect::<Vec<_>>()[..] {
                 [b"ply"] => lines == 1,
                 [b"format", name, b"1.0"] => {
                     encoding = match name {
@@ -153,10 +143,11 @@ impl<'a> Header<'a> {
                     let name = String::from_utf8_lossy(name).into_owned();
                     let is_new = elements.iter().all(|element| element.name != name);
                     let count = parsed(count);
+                    let properties = Vec::new();
                     elements.extend(count.map(|count| Element {
                         name,
                         count,
-                        properties: Vec::new(),
+                        properties,
                     }));
                     is_new && count.is_some()
                 }
@@ -190,10 +181,8 @@ impl<'a> Header<'a> {
                 _ => false,
             };
             if !is_understood {
-                let what = format!(
-                    "{:?} is not understood in the header of a PLY file",
-                    shown(line.trim_ascii())
-                );
+                let line = shown(line.trim_ascii());
+                let what = format!("{line:?} is not understood in the header of a PLY file");
                 return Err(ImportError::on_line(lines, what));
             }
             rest = after;
@@ -211,16 +200,21 @@ impl<'a> Header<'a> {
     /// Checks the header's claims against the length of the file.
     fn check(&self, bytes: usize, limits: MeshLimits) -> Result<(), ImportError> {
         let vertices = self.count("vertex");
-        let Some(face) = self.element("face").filter(|face| face.count > 0) else {
+        if self.count("face") == 0 {
             return Err(wrong_header(if self.count("tristrips") > 0 {
                 "has triangle strips; export the mesh with faces".to_owned()
             } else {
                 format!("has {vertices} vertices and no faces: a point cloud; make a mesh with faces of it")
             }));
-        };
+        }
         for element in &self.elements {
             let Element { name, count, .. } = element;
-            let least = element.least_bytes(self.encoding);
+            // In text, a digit and a separator for each property.
+            let sizes = element.properties.iter().map(|property| match self.encoding {
+                Encoding::Text => 2,
+                _ => property.length.unwrap_or(property.scalar).bytes(),
+            });
+            let least: usize = sizes.sum();
             if least == 0 {
                 return Err(wrong_header(format!("element {name:?} has no properties")));
             }
@@ -230,39 +224,29 @@ impl<'a> Header<'a> {
                 )));
             }
         }
-        let has_number = |axis: &&str| {
-            let properties = self
-                .element("vertex")
-                .map_or(&[][..], |vertex| &vertex.properties);
-            properties
-                .iter()
-                .any(|property| property.name == *axis && property.length.is_none())
+        let properties = |element: &str| self.element(element).into_iter().flat_map(|own| &own.properties);
+        let is_number = |axis: &&str| {
+            properties("vertex").any(|property| property.name == **axis && property.length.is_none())
         };
-        if !AXES.iter().all(has_number) {
+        if !AXES.iter().all(is_number) {
             return Err(wrong_header("has no vertices with x, y and z"));
         }
-        let lists = face.properties.iter().filter_map(|property| {
-            let is_index_list = INDEX_LISTS.contains(&property.name.as_str());
-            Some((property, property.length?)).filter(|_| is_index_list)
-        });
-        let lists: Vec<(&Property, Scalar)> = lists.collect();
-        if lists.is_empty() {
-            return Err(wrong_header(
-                "has faces without a list vertex_indices or vertex_index",
-            ));
+        let mut lists = properties("face")
+            .filter(|list| list.length.is_some() && list.is_of_indices())
+            .peekable();
+        if lists.peek().is_none() {
+            let what = "has faces without a list vertex_indices or vertex_index";
+            return Err(wrong_header(what));
         }
-        let is_float = |scalar| matches!(scalar, Scalar::Float(_));
-        if let Some((list, _)) = lists
-            .iter()
-            .find(|(list, length)| is_float(*length) || is_float(list.scalar))
-        {
+        let is_float = |scalar: &Scalar| matches!(scalar, Scalar::Float(_));
+        if let Some(list) = lists.find(|list| list.length.iter().chain([&list.scalar]).any(is_float)) {
             return Err(wrong_header(format!(
                 "has a list {} of fractions (float or double); numbers of corners and vertices must be whole (uchar, int and the \
                  like)",
                 list.name
             )));
         }
-        check_counts(vertices as u64, face.count as u64, limits)
+        check_counts(vertices as u64, self.count("face") as u64, limits)
     }
 }
 
@@ -295,7 +279,7 @@ impl Row {
                 let what = format!("has a list {:?} of {length} numbers", property.name);
                 return Err(ImportError::at("the PLY file", what));
             }
-            let is_used = INDEX_LISTS.contains(&property.name.as_str());
+            let is_used = property.is_of_indices();
             let mut corners = Some(Vec::new());
             for _ in 0..length as u64 {
                 let index = next(property, property.scalar, false)?;
@@ -311,33 +295,6 @@ impl Row {
         }
         Ok(row)
     }
-
-    fn of_line(element: &Element, line: usize, text: &[u8]) -> Result<Self, ImportError> {
-        let mut words = words(text);
-        Self::read(element, |property, _, counts| {
-            let Some(word) = words.next() else {
-                let Property { name, .. } = property;
-                let what = format!("ends before {name:?} of element {:?} is complete", element.name);
-                return Err(ImportError::on_line(line, what));
-            };
-            number(line, word).or_else(|error| if counts { Err(error) } else { Ok(f64::NAN) })
-        })
-    }
-
-    fn of_bytes(element: &Element, encoding: Encoding, body: &mut &[u8]) -> Result<Self, ImportError> {
-        Self::read(element, |_, scalar, _| {
-            let (number, rest) = body
-                .split_at_checked(scalar.bytes())
-                .ok_or_else(|| element.cut_off())?;
-            *body = rest;
-            let mut bytes = [0; 8];
-            bytes[..number.len()].copy_from_slice(number);
-            if encoding == Encoding::BigEndian {
-                bytes[..number.len()].reverse();
-            }
-            Ok(scalar.number(bytes))
-        })
-    }
 }
 
 /// Reads a file.
@@ -345,7 +302,7 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
     let bytes = without_mark(bytes);
     let header = Header::read(bytes)?;
     header.check(bytes.len(), limits)?;
-    let mut raw = RawMesh::new(Places::Faces);
+    let mut raw = RawMesh::new("the PLY mesh", Places::Faces);
     let vertices = header.count("vertex");
     raw.positions.reserve_exact(vertices);
     let names = raw.names.add_part("");
@@ -358,8 +315,17 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
         for place in 0..element.count {
             stop.check_every(ELEMENTS_PER_CHECK, place)?;
             let row = if header.encoding == Encoding::Text {
-                let (number, line) = lines.next().ok_or_else(|| element.cut_off())?;
-                match Row::of_line(element, number, line) {
+                let (line, text) = lines.next().ok_or_else(|| element.cut_off())?;
+                let mut words = words(text);
+                let row = Row::read(element, |property, _, counts| {
+                    let Some(word) = words.next() else {
+                        let (name, of) = (&property.name, &element.name);
+                        let what = format!("ends before {name:?} of element {of:?} is complete");
+                        return Err(ImportError::on_line(line, what));
+                    };
+                    number(line, word).or_else(|error| if counts { Err(error) } else { Ok(f64::NAN) })
+                });
+                match row {
                     Ok(row) => row,
                     Err(error) => {
                         wrong_lines.push(error);
@@ -367,37 +333,43 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
                     }
                 }
             } else {
-                Row::of_bytes(element, header.encoding, &mut body)?
+                Row::read(element, |_, scalar, _| {
+                    let (number, rest) = body
+                        .split_at_checked(scalar.bytes())
+                        .ok_or_else(|| element.cut_off())?;
+                    body = rest;
+                    let mut bytes = [0; 8];
+                    let own = &mut bytes[..number.len()];
+                    own.copy_from_slice(number);
+                    if header.encoding == Encoding::BigEndian {
+                        own.reverse();
+                    }
+                    Ok(scalar.number(bytes))
+                })?
             };
             if element.name == "vertex" {
                 raw.positions.push(DVec3::from_array(row.position));
             } else if element.name == "face" {
                 match face(row, vertices) {
                     Err(what) => wrong_faces.add(format!("face {place}"), what),
-                    Ok(corners) if corners.len() < 3 => raw.without_area.note(place),
+                    Ok(corners) if corners.len() < 3 => raw.oddities.note(Oddity::FewCorners, place),
                     Ok(corners) => {
-                        let triangles = raw.faces.triangles() + corners.len() - 2;
-                        check_counts(0, triangles as u64, limits)?;
-                        raw.faces.push(RawFace {
-                            place,
-                            corners: corners.len(),
-                            names,
-                        });
+                        raw.add_face(corners.len(), place, names);
                         raw.corners.extend(corners);
+                        check_counts(0, raw.triangles as u64, limits)?;
                     }
                 }
             }
         }
     }
-    wrong_lines.into_result()?;
-    wrong_faces.into_result()?;
+    wrong_lines.into_result().and(wrong_faces.into_result())?;
     let (left, what) = match header.encoding {
         Encoding::Text => (lines.count(), "lines"),
         _ => (body.len(), "bytes"),
     };
     if left > 0 {
-        raw.warnings
-            .push(format!("{left} {what} behind the last element were ignored"));
+        let warning = format!("{left} {what} behind the last element were ignored");
+        raw.warnings.push(warning);
     }
     Ok(raw)
 }

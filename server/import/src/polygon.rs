@@ -10,8 +10,7 @@ use std::collections::VecDeque;
 use glam::{DVec2, DVec3};
 use grasp_synthesis::base::stop::{Stop, Stopped};
 
-/// Largest number of corners of a polygon that is not split into a fan. Clipping ears takes a time that grows with the
-/// square of this number: up to a second for one polygon.
+/// Most corners of a polygon that is not split into a fan: clipping takes up to a second, and grows with the square of their number.
 pub(crate) const MAX_CLIPPED_CORNERS: usize = 10_000;
 
 /// Rounding errors of a corner's position that the sign of an area must exceed: one for each of its two sides.
@@ -32,7 +31,6 @@ pub(crate) enum Split {
 ///
 /// The positions are taken to be exact to single precision, at least as seen from the mesh's origin. A polygon that is not flat is
 /// split as its projection on the plane of its mean normal.
-///
 pub(crate) fn split(
     corners: &[DVec3],
     triangles: &mut Vec<[usize; 3]>,
@@ -75,10 +73,8 @@ struct Outline {
 impl Outline {
     /// The polygon on the plane of its mean normal; without such a plane, how its fan covers it.
     fn of(corners: &[DVec3]) -> Result<Self, Split> {
-        let largest = corners
-            .iter()
-            .map(|corner| corner.abs().max_element())
-            .fold(0.0, f64::max);
+        let sizes = corners.iter().map(|corner| corner.abs().max_element());
+        let largest = sizes.fold(0.0, f64::max);
         let rounding = largest * f64::from(f32::EPSILON);
         let first = corners[0];
         let mut normal = DVec3::ZERO;
@@ -102,9 +98,9 @@ impl Outline {
             });
         }
         let (x, y) = normal.normalize().any_orthonormal_pair();
-        let points = corners
-            .iter()
-            .map(|&corner| DVec2::new((corner - first).dot(x), (corner - first).dot(y)))
+        let offsets = corners.iter().map(|&corner| corner - first);
+        let points = offsets
+            .map(|offset| DVec2::new(offset.dot(x), offset.dot(y)))
             .collect();
         Ok(Self { points, rounding })
     }
@@ -161,8 +157,7 @@ impl Outline {
     }
 }
 
-/// Rounds through all levels. Clipping a corner without area can free ears elsewhere, once for each place where the
-/// polygon touches itself several times.
+/// Rounds through all levels: clipping a corner without area can free ears where the polygon touches itself several times.
 const ROUNDS: usize = 3;
 
 /// How much an ear may touch the rest of the polygon. Later levels are for polygons that touch themselves.
@@ -247,9 +242,8 @@ impl<'a> Rest<'a> {
 
     /// Clips ears until none is left or one triangle remains.
     fn clip(&mut self, level: Level, stop: Stop<'_>) -> Result<(), Stopped> {
-        let mut candidates: VecDeque<usize> = (0..self.is_left.len())
-            .filter(|&corner| self.is_left[corner])
-            .collect();
+        let corners = 0..self.is_left.len();
+        let mut candidates: VecDeque<usize> = corners.filter(|&corner| self.is_left[corner]).collect();
         while let Some(corner) = candidates.pop_front()
             && self.count > 3
         {
@@ -324,61 +318,5 @@ impl<'a> Rest<'a> {
         let (before, after) = (self.previous[corner], self.next[corner]);
         self.triangles.push([before, corner, after]);
         Some(self.triangles)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn flat(corners: &[(f64, f64)]) -> Vec<DVec3> {
-        corners.iter().map(|&(x, y)| DVec3::new(x, y, 0.0)).collect()
-    }
-
-    /// Twice the area of each triangle, positive if counter-clockwise seen from +Z.
-    fn split_areas(corners: &[(f64, f64)]) -> (Split, Vec<f64>) {
-        let corners = flat(corners);
-        let mut triangles = Vec::new();
-        let split = split(&corners, &mut triangles, Stop::NEVER).unwrap();
-        let areas = triangles
-            .iter()
-            .map(|triangle| {
-                let [a, b, c] = triangle.map(|corner| corners[corner]);
-                (b - a).cross(c - a).z
-            })
-            .collect();
-        (split, areas)
-    }
-
-    #[test]
-    fn spike_and_repeated_corner_have_no_area() {
-        // An L whose corners repeat, with a spike of no width at its end.
-        let outline = [
-            (0.0, 0.0),
-            (2.0, 0.0),
-            (5.0, 0.0),
-            (2.0, 0.0),
-            (2.0, 1.0),
-            (2.0, 1.0),
-            (1.0, 1.0),
-            (1.0, 2.0),
-            (0.0, 2.0),
-        ];
-        for start in 0..outline.len() {
-            let mut turned = outline;
-            turned.rotate_left(start);
-            let (split, areas) = split_areas(&turned);
-            assert_eq!(split, Split::Exact, "{start}");
-            assert_eq!(areas.len(), 7);
-            assert!(areas.iter().all(|&area| area >= 0.0), "{start}: {areas:?}");
-            assert_eq!(areas.iter().sum::<f64>(), 2.0 * 3.0, "{start}");
-        }
-    }
-
-    #[test]
-    fn line_is_a_fan_without_area() {
-        let (split, areas) = split_areas(&[(0.0, 0.0), (1.0, 1.0), (3.0, 3.0), (2.0, 2.0)]);
-        assert_eq!(split, Split::Exact);
-        assert_eq!(areas, [0.0; 2]);
     }
 }

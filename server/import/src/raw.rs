@@ -1,7 +1,5 @@
 //! A mesh as a file has it, before it is split into triangles, welded and checked.
 
-use std::fmt;
-
 use glam::DVec3;
 
 use crate::{
@@ -41,24 +39,26 @@ pub(crate) struct RawMesh {
     pub(crate) corners: Vec<u32>,
     /// The faces, in the file's order.
     pub(crate) faces: Faces,
+    /// Number of triangles of the file after polygons are split.
+    pub(crate) triangles: usize,
     /// The names of faces' parts.
     pub(crate) names: NameSets,
     /// What faces are counted by.
     pub(crate) places: Places,
+    /// What messages call the mesh of a format that its sender may believe to be another; empty for OBJ.
+    name: &'static str,
     /// Vertices that no face uses, if the reader knows.
     pub(crate) unused_vertices: usize,
-    /// Points, lines, and faces with fewer than three corners.
-    pub(crate) without_area: Occurrences,
-    /// Lines that start with an unknown keyword.
-    pub(crate) unknown: Occurrences,
+    pub(crate) oddities: Oddities,
     /// What was read otherwise than may be expected.
     pub(crate) warnings: Vec<String>,
 }
 
 impl RawMesh {
-    pub(crate) fn new(places: Places) -> Self {
+    pub(crate) fn new(name: &'static str, places: Places) -> Self {
         Self {
             places,
+            name,
             ..Self::default()
         }
     }
@@ -68,39 +68,52 @@ impl RawMesh {
         let mut violations = Violations::default();
         for (vertex, position) in self.positions.iter().enumerate() {
             let largest = position.abs().max_element() * unit_metres;
-            let what = if !position.is_finite() {
-                "is not finite".to_owned()
+            if !position.is_finite() {
+                violations.add(format!("vertex {vertex}"), "is not finite");
             } else if largest > MAX_COORDINATE_METRES {
-                too_far(largest)
-            } else {
-                continue;
-            };
-            violations.add(format!("vertex {vertex}"), what);
+                violations.add(format!("vertex {vertex}"), too_far(largest));
+            }
         }
         violations.into_result()
     }
 
-    /// Adds a triangle.
-    pub(crate) fn add_triangle(&mut self, corners: [u32; 3], place: usize, names: usize) {
+    pub(crate) fn add_triangle(&mut self, corners: [u32; 3], place: usize, names: u32) {
         self.corners.extend(corners);
-        self.faces.push(RawFace {
-            place,
-            corners: 3,
-            names,
-        });
+        self.add_face(3, place, names);
     }
 
-    /// Numbers the vertices in the order of their first use and drops those that no face uses.
-    pub(crate) fn keep_used_vertices(&mut self) {
+    /// Adds a face whose corners are or will be in [`RawMesh::corners`].
+    pub(crate) fn add_face(&mut self, corners: usize, place: usize, names: u32) {
+        self.faces.push(RawFace {
+            place: place as u32,
+            corners: corners as u32,
+            names,
+            triangle: self.triangles as u32,
+        });
+        self.triangles += corners - 2;
+    }
+
+    /// Keeps some faces and their vertices, which are numbered in the order of their first use.
+    pub(crate) fn keep(&mut self, is_kept: impl Fn(RawFace) -> bool) {
         let positions = std::mem::take(&mut self.positions);
+        let corners = std::mem::take(&mut self.corners);
         let mut numbers = vec![u32::MAX; positions.len()];
-        for corner in &mut self.corners {
-            let number = &mut numbers[*corner as usize];
-            if *number == u32::MAX {
-                *number = self.positions.len() as u32;
-                self.positions.push(positions[*corner as usize]);
+        let mut rest = corners.as_slice();
+        for face in std::mem::take(&mut self.faces).iter() {
+            let (own, others) = rest.split_at(face.corners as usize);
+            rest = others;
+            if !is_kept(face) {
+                continue;
             }
-            *corner = *number;
+            self.faces.push(face);
+            for &corner in own {
+                let number = &mut numbers[corner as usize];
+                if *number == u32::MAX {
+                    *number = self.positions.len() as u32;
+                    self.positions.push(positions[corner as usize]);
+                }
+                self.corners.push(*number);
+            }
         }
     }
 
@@ -130,12 +143,21 @@ impl RawMesh {
         centre
     }
 
-    /// The error of a mesh without triangles, of which some were dropped.
-    pub(crate) fn empty(&self, dropped: usize) -> ImportError {
-        ImportError::Empty {
-            dropped: self.without_area.count + dropped,
-            unknown: self.unknown.count,
+    /// The error of a mesh without triangles.
+    pub(crate) fn empty(&self) -> ImportError {
+        let count = |oddity| self.oddities.of(oddity).count;
+        let dropped = count(Oddity::FewCorners) + count(Oddity::NoArea);
+        if self.name.is_empty() {
+            return ImportError::Whole(format!(
+                "the mesh has no triangles; {dropped} points, lines and faces without area and {} lines with an unknown \
+                 keyword were ignored",
+                count(Oddity::UnknownLine)
+            ));
         }
+        let ignored = (dropped > 0).then(|| format!("{dropped} faces without area were ignored"));
+        let mut what = vec!["has no triangles".to_owned()];
+        what.extend(ignored.into_iter().chain(self.warnings.iter().cloned()));
+        ImportError::at(self.name, what.join("; "))
     }
 }
 
@@ -143,87 +165,55 @@ impl RawMesh {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct RawFace {
     /// Its place in the file, counted as [`RawMesh::places`] says.
-    pub(crate) place: usize,
+    pub(crate) place: u32,
     /// Number of corners, at least 3.
-    pub(crate) corners: usize,
+    pub(crate) corners: u32,
     /// Index of its names in [`RawMesh::names`].
-    pub(crate) names: usize,
+    pub(crate) names: u32,
+    /// Index in the file of its first triangle.
+    pub(crate) triangle: u32,
 }
 
-/// Consecutive faces with as many corners and the same names, at consecutive places.
-#[derive(Clone, Copy, Debug)]
-struct Run {
-    /// The place of the first face.
-    place: u32,
-    corners: u32,
-    names: u32,
-    faces: u32,
-    /// Triangles of all faces before.
-    first_triangle: u32,
-}
-
-impl Run {
-    fn face(self, number: u32) -> RawFace {
-        RawFace {
-            place: (self.place + number) as usize,
-            corners: self.corners as usize,
-            names: self.names as usize,
+impl RawFace {
+    /// The face that comes some faces after this one if all are alike.
+    fn after(self, faces: u32) -> Self {
+        Self {
+            place: self.place + faces,
+            triangle: self.triangle + faces * (self.corners - 2),
+            ..self
         }
     }
-
-    fn end(self) -> u32 {
-        self.first_triangle + self.faces * (self.corners - 2)
-    }
 }
 
-/// The faces of a file in its order, as runs of alike ones, which take little memory: most files have one.
+/// The faces of a file in its order, as the first and the number of alike ones, which take little memory: most files have one run.
 #[derive(Debug, Default)]
-pub(crate) struct Faces(Vec<Run>);
+pub(crate) struct Faces(Vec<(RawFace, u32)>);
 
 impl Faces {
-    /// Adds a face.
-    pub(crate) fn push(&mut self, face: RawFace) {
-        let last = self.0.last_mut();
-        if let Some(run) = last.filter(|run| run.face(run.faces) == face) {
-            run.faces += 1;
-            return;
+    fn push(&mut self, face: RawFace) {
+        match self.0.last_mut() {
+            Some((first, count)) if first.after(*count) == face => *count += 1,
+            _ => self.0.push((face, 1)),
         }
-        self.0.push(Run {
-            place: face.place as u32,
-            corners: face.corners as u32,
-            names: face.names as u32,
-            faces: 1,
-            first_triangle: self.triangles() as u32,
-        });
-    }
-
-    /// Number of triangles after polygons are split.
-    pub(crate) fn triangles(&self) -> usize {
-        self.0.last().map_or(0, |run| run.end() as usize)
     }
 
     /// True if no face has more than three corners.
     pub(crate) fn are_triangles(&self) -> bool {
-        self.0.iter().all(|run| run.corners == 3)
+        self.0.iter().all(|(face, _)| face.corners == 3)
     }
 
     /// The faces in the file's order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = RawFace> {
         let runs = self.0.iter();
-        runs.flat_map(|&run| (0..run.faces).map(move |number| run.face(number)))
+        runs.flat_map(|&(first, count)| (0..count).map(move |number| first.after(number)))
     }
 
-    /// The face of each triangle in turn.
+    /// The face of each triangle, with the index of that triangle.
     pub(crate) fn by_triangle(&self) -> impl Iterator<Item = RawFace> {
-        self.iter()
-            .flat_map(|face| std::iter::repeat_n(face, face.corners - 2))
-    }
-
-    /// The face of a triangle, which must exist.
-    pub(crate) fn of_triangle(&self, triangle: usize) -> RawFace {
-        let triangle = triangle as u32;
-        let run = self.0[self.0.partition_point(|run| run.end() <= triangle)];
-        run.face((triangle - run.first_triangle) / (run.corners - 2))
+        self.iter().flat_map(|face| {
+            let triangles = face.triangle..face.triangle + face.corners - 2;
+            triangles.map(move |triangle| RawFace { triangle, ..face })
+        })
     }
 }
 
@@ -239,17 +229,13 @@ pub(crate) enum Places {
     Triangles,
 }
 
-/// A place in a file.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Place(pub(crate) Places, pub(crate) usize);
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(places, number) = self;
-        match places {
-            Places::Lines => write!(f, "on line {number}"),
-            Places::Faces => write!(f, "face {number}"),
-            Places::Triangles => write!(f, "triangle {number}"),
+impl Places {
+    /// A place in words.
+    pub(crate) fn named(self, place: usize) -> String {
+        match self {
+            Self::Lines => format!("on line {place}"),
+            Self::Faces => format!("face {place}"),
+            Self::Triangles => format!("triangle {place}"),
         }
     }
 }
@@ -273,6 +259,84 @@ impl Occurrences {
     }
 }
 
+/// What may be odd about a file and its mesh, in the order of their warnings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Oddity {
+    UnknownLine,
+    FewCorners,
+    NoArea,
+    Overlapping,
+    Repeated,
+    TwoSided,
+    /// One of two sides, of which neither is needed to close the surface.
+    Undecided,
+    Disagreeing,
+    InsideOut,
+    OpenEdge,
+    InconsistentEdge,
+    CrowdedEdge,
+}
+
+/// All oddities in words.
+pub(crate) const ODDITIES: [(Oddity, &str); 12] = [
+    (
+        Oddity::UnknownLine,
+        "lines start with an unknown keyword and were ignored",
+    ),
+    (
+        Oddity::FewCorners,
+        "points, lines and faces with fewer than three corners were dropped",
+    ),
+    (Oddity::NoArea, "triangles without area were dropped"),
+    (
+        Oddity::Overlapping,
+        "polygons intersect themselves; their fans of triangles overlap",
+    ),
+    (
+        Oddity::Repeated,
+        "triangles that repeat an earlier one were dropped",
+    ),
+    (
+        Oddity::TwoSided,
+        "triangles that repeat an earlier one with the opposite winding were dropped: of faces with two sides, one was kept",
+    ),
+    (
+        Oddity::Undecided,
+        "triangles that repeat an earlier one with the opposite winding were kept: the rest of the surface is closed without either",
+    ),
+    (
+        Oddity::Disagreeing,
+        "triangles faced the opposite way of the rest of their part and were turned",
+    ),
+    (
+        Oddity::InsideOut,
+        "triangles of parts that were inside out were turned",
+    ),
+    (
+        Oddity::OpenEdge,
+        "edges are open: the surface has holes and its volume is an estimate",
+    ),
+    (
+        Oddity::InconsistentEdge,
+        "edges join triangles that face opposite ways: the winding is inconsistent",
+    ),
+    (Oddity::CrowdedEdge, "edges join more than two triangles"),
+];
+
+/// How often each oddity occurred, and where first: up to [`Oddity::FewCorners`] at a place of the file, then at a triangle's index.
+#[derive(Debug, Default)]
+pub(crate) struct Oddities([Occurrences; ODDITIES.len()]);
+
+impl Oddities {
+    pub(crate) fn note(&mut self, oddity: Oddity, place: usize) {
+        self.0[oddity as usize].note(place);
+    }
+
+    pub(crate) fn of(&self, oddity: Oddity) -> Occurrences {
+        self.0[oddity as usize]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -282,30 +346,20 @@ mod tests {
     proptest! {
         #[test]
         fn runs_are_the_faces_that_were_added(
-            steps in prop::collection::vec((1_usize..3, 3_usize..6, 0_usize..2), 0..40),
+            steps in prop::collection::vec((1_u32..3, 3_u32..6, 0_u32..2), 0..40),
         ) {
-            let mut place = 0;
-            let added: Vec<RawFace> = steps
-                .into_iter()
-                .map(|(step, corners, names)| {
-                    place += step;
-                    RawFace { place, corners, names }
-                })
-                .collect();
-            let mut faces = Faces::default();
-            for &face in &added {
-                faces.push(face);
+            let (mut raw, mut added) = (RawMesh::default(), Vec::new());
+            let (mut place, mut triangle) = (0, 0);
+            for (step, corners, names) in steps {
+                place += step;
+                raw.add_face(corners as usize, place as usize, names);
+                added.push(RawFace { place, corners, names, triangle });
+                triangle += corners - 2;
             }
-            let by_triangle: Vec<RawFace> = added
-                .iter()
-                .flat_map(|face| vec![*face; face.corners - 2])
-                .collect();
-            prop_assert_eq!(faces.iter().collect::<Vec<_>>(), added);
-            prop_assert_eq!(faces.triangles(), by_triangle.len());
-            prop_assert_eq!(faces.by_triangle().collect::<Vec<_>>(), by_triangle.clone());
-            for (triangle, face) in by_triangle.iter().enumerate() {
-                prop_assert_eq!(faces.of_triangle(triangle), *face);
-            }
+            prop_assert_eq!(raw.faces.iter().collect::<Vec<_>>(), added.clone());
+            let of_triangles = added.iter().flat_map(|face| vec![face.place; face.corners as usize - 2]).zip(0..);
+            let found = raw.faces.by_triangle().map(|face| (face.place, face.triangle));
+            prop_assert!(found.eq(of_triangles));
         }
     }
 }

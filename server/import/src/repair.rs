@@ -1,6 +1,9 @@
 //! Splits the polygons of a mesh from a file, welds it, checks it and repairs what is certain.
 
-use std::{collections::HashMap, fmt};
+use std::{
+    collections::HashMap,
+    hash::{BuildHasher, BuildHasherDefault, DefaultHasher},
+};
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::{
@@ -10,11 +13,11 @@ use grasp_synthesis::{
 
 use crate::{
     Import, ImportedMesh,
-    edges::{Doubles, Edges, components},
+    edges::{Doubles, components, note_odd},
     error::{ImportError, Violations},
     polygon::{MAX_CLIPPED_CORNERS, Split, split},
-    raw::{Occurrences, Place, Places, RawMesh},
-    winding::{TurnedTriangles, face_outward},
+    raw::{ODDITIES, Occurrences, Oddity, Places, RawMesh},
+    winding::face_outward,
 };
 
 /// Faces split between two checks whether to stop.
@@ -23,16 +26,14 @@ const FACES_PER_CHECK: usize = 256;
 /// Vertices welded between two checks whether to stop.
 const VERTICES_PER_CHECK: usize = 4096;
 
-/// Splits polygons, welds, drops degenerate and repeated triangles, turns those that face the wrong way, and checks how they
-/// join.
+/// Splits polygons, welds, drops degenerate and repeated triangles, turns those that face the wrong way, and notes how they join.
 pub(crate) fn repair(
     mut raw: RawMesh,
     import: Import,
     origin_in_file: DVec3,
     stop: Stop<'_>,
 ) -> Result<ImportedMesh, Violations> {
-    let mut overlapping = Occurrences::default();
-    let mut corners = split_faces(&mut raw, &mut overlapping, stop)?;
+    let mut corners = split_faces(&mut raw, stop)?;
     let (positions, welded) = weld(&raw.positions, import, stop)?;
     raw.positions = Vec::new();
     for corner in &mut corners {
@@ -45,55 +46,43 @@ pub(crate) fn repair(
     stop.check()?;
 
     // Slivers with three distinct vertices have no area but still close the gap between their neighbours.
-    let is_dropped: Vec<bool> = triangles
-        .iter()
-        .map(|&[a, b, c]| a == b || b == c || c == a)
-        .collect();
-    let mut without_area = Occurrences::default();
-    for face in chosen(raw.faces.by_triangle(), &is_dropped) {
-        without_area.note(face.place);
-    }
-    let place_of = |triangle: usize| raw.faces.of_triangle(triangle).place;
-    let mut doubles = Doubles::of(triangles, is_dropped, stop)?;
-    let turned = face_outward(&positions, triangles, &mut doubles.uses, stop)?;
+    let are_degenerate = triangles.iter().map(|&[a, b, c]| a == b || b == c || c == a);
+    let is_dropped: Vec<bool> = are_degenerate.collect();
+    let oddities = &mut raw.oddities;
+    chosen(0.., &is_dropped).for_each(|triangle| oddities.note(Oddity::NoArea, triangle));
+    let mut doubles = Doubles::of(triangles, is_dropped, oddities, stop)?;
+    face_outward(&positions, triangles, &mut doubles.uses, oddities, stop)?;
     stop.check()?;
     let is_single: Vec<bool> = doubles.is_dropped.iter().map(|is_dropped| !is_dropped).collect();
-    let edges = Edges::of(&doubles.uses);
-    doubles.uses = Vec::new();
+    note_odd(&doubles.uses, oddities);
+    drop(doubles);
     let parts = components(chosen(triangles.iter().copied(), &is_single), positions.len());
     let mut is_kept = vec![false; triangles.len()];
     for triangle in chosen(0.., &is_single) {
         is_kept[triangle] = has_area(&positions, triangles[triangle]);
         if !is_kept[triangle] {
-            without_area.note(place_of(triangle));
+            oddities.note(Oddity::NoArea, triangle);
         }
     }
     if !is_kept.contains(&true) {
-        return Err(raw.empty(without_area.count).into());
+        return Err(raw.empty().into());
     }
 
-    let findings = Findings {
-        without_area,
-        overlapping,
-        doubles,
-        turned,
-        edges,
-        parts,
-    };
-    let warnings = findings.warnings(&raw);
+    let singles = is_single.iter().filter(|is_single| **is_single).count();
+    let warnings = warnings(&raw, singles, parts);
     let kept = is_kept.iter().filter(|is_kept| **is_kept).count();
     let mut indices_in_file = Vec::with_capacity(kept);
-    indices_in_file.extend(chosen(0.., &is_kept));
+    indices_in_file.extend(chosen(raw.faces.by_triangle(), &is_kept).map(|face| face.triangle));
     let mut of_mesh = Vec::with_capacity(kept);
     of_mesh.extend(chosen(triangles.iter().copied(), &is_kept));
     drop(corners);
-    let names = raw.faces.by_triangle().map(|face| face.names);
+    let names = raw.faces.by_triangle().map(|face| face.names as usize);
     let groups = raw.names.groups(chosen(names, &is_kept));
     let mesh = TriangleMesh::new(positions, of_mesh).map_err(ImportError::from)?;
     Ok(ImportedMesh {
         mesh,
         origin_in_file,
-        triangles_in_file: raw.faces.triangles(),
+        triangles_in_file: raw.triangles,
         groups,
         indices_in_file,
         warnings,
@@ -105,148 +94,51 @@ fn chosen<T>(items: impl Iterator<Item = T>, is_chosen: &[bool]) -> impl Iterato
     paired.filter(|(_, is_chosen)| **is_chosen).map(|(item, _)| item)
 }
 
-/// What is odd about a mesh beside the notes of its reader.
-struct Findings {
-    /// Triangles of the file without area.
-    without_area: Occurrences,
-    /// Polygons that intersect themselves.
-    overlapping: Occurrences,
-    doubles: Doubles,
-    turned: TurnedTriangles,
-    edges: Edges,
-    /// Number of connected parts.
-    parts: usize,
-}
-
-impl Findings {
-    /// One warning of each kind, after those of the reader.
-    fn warnings(&self, raw: &RawMesh) -> Vec<String> {
-        let (doubles, turned, edges) = (&self.doubles, &self.turned, &self.edges);
-        let place_of = |triangle: usize| raw.faces.of_triangle(triangle).place;
-        let mut warnings = raw.warnings.clone();
-        let of_place = |first| Place(raw.places, first);
-        tell(
-            &mut warnings,
-            &[
-                (
-                    raw.unknown,
-                    "lines start with an unknown keyword and were ignored",
-                ),
-                (
-                    raw.without_area,
-                    "points, lines and faces with fewer than three corners were dropped",
-                ),
-                (self.without_area, "triangles without area were dropped"),
-                (
-                    self.overlapping,
-                    "polygons intersect themselves; their fans of triangles overlap",
-                ),
-            ],
-            of_place,
-        );
-        let singles = doubles
-            .is_dropped
-            .iter()
-            .filter(|is_dropped| !**is_dropped)
-            .count();
-        let is_whole = turned.inside_out.count == singles;
-        let some_inside_out = if is_whole {
-            Occurrences::default()
-        } else {
-            turned.inside_out
+/// One warning of each oddity of a mesh, after those of its reader. It has `singles` triangles once, in `parts` connected parts.
+fn warnings(raw: &RawMesh, singles: usize, parts: usize) -> Vec<String> {
+    let is_whole = raw.oddities.of(Oddity::InsideOut).count == singles;
+    let mut warnings = raw.warnings.clone();
+    for (oddity, what) in ODDITIES {
+        if oddity == Oddity::OpenEdge {
+            let whole = is_whole.then(|| "the mesh was inside out; all triangles were turned".to_owned());
+            let unused = Some(raw.unused_vertices).filter(|&count| count > 0);
+            warnings.extend(whole);
+            warnings.extend(unused.map(|count| format!("{count} vertices are not used by any face")));
+        }
+        let Occurrences { count, mut first } = raw.oddities.of(oddity);
+        if count == 0 || oddity == Oddity::InsideOut && is_whole {
+            continue;
+        }
+        if oddity > Oddity::FewCorners {
+            let mut faces = raw.faces.by_triangle();
+            first = faces.nth(first).map_or(0, |face| face.place as usize);
+        }
+        let before = match raw.places {
+            _ if oddity < Oddity::OpenEdge => "",
+            Places::Lines => "at the face ",
+            _ => "at ",
         };
-        tell(
-            &mut warnings,
-            &[
-                (
-                    doubles.repeated,
-                    "triangles that repeat an earlier one were dropped",
-                ),
-                (
-                    doubles.two_sided,
-                    "triangles that repeat an earlier one with the opposite winding were dropped: of faces with two sides, one was kept",
-                ),
-                (
-                    doubles.undecided,
-                    "triangles that repeat an earlier one with the opposite winding were kept: the rest of the surface is closed \
-                     without either",
-                ),
-                (
-                    turned.disagreeing,
-                    "triangles faced the opposite way of the rest of their part and were turned",
-                ),
-                (
-                    some_inside_out,
-                    "triangles of parts that were inside out were turned",
-                ),
-            ],
-            |first| of_place(place_of(first)),
-        );
-        if is_whole {
-            warnings.push("the mesh was inside out; all triangles were turned".to_owned());
-        }
-        if raw.unused_vertices > 0 {
-            let unused = raw.unused_vertices;
-            warnings.push(format!("{unused} vertices are not used by any face"));
-        }
-        tell(
-            &mut warnings,
-            &[
-                (
-                    edges.open,
-                    "edges are open: the surface has holes and its volume is an estimate",
-                ),
-                (
-                    edges.inconsistent,
-                    "edges join triangles that face opposite ways: the winding is inconsistent",
-                ),
-                (edges.crowded, "edges join more than two triangles"),
-            ],
-            |first| {
-                let face = if raw.places == Places::Lines {
-                    "the face "
-                } else {
-                    ""
-                };
-                format!("at {face}{}", of_place(place_of(first)))
-            },
-        );
-        if self.parts > 1 {
-            let parts = self.parts;
-            warnings.push(format!("{parts} parts are disconnected: they share no vertex"));
-        }
-        warnings
+        let place = raw.places.named(first);
+        warnings.push(format!("{count} {what}; the first is {before}{place}"));
     }
+    if parts > 1 {
+        warnings.push(format!("{parts} parts are disconnected: they share no vertex"));
+    }
+    warnings
 }
 
-/// Adds a warning of each kind of oddity that occurred.
-fn tell<P: fmt::Display>(
-    warnings: &mut Vec<String>,
-    oddities: &[(Occurrences, &str)],
-    place: impl Fn(usize) -> P,
-) {
-    for (Occurrences { count, first }, what) in oddities.iter().filter(|(oddity, _)| oddity.count > 0) {
-        warnings.push(format!("{count} {what}; the first is {}", place(*first)));
-    }
-}
-
-/// Splits every face; one of n corners becomes n - 2 triangles, given by their corners in the file's order. Takes the corners of
-/// a mesh that has triangles only.
-fn split_faces(
-    raw: &mut RawMesh,
-    overlapping: &mut Occurrences,
-    stop: Stop<'_>,
-) -> Result<Vec<u32>, Violations> {
+/// Splits every face of n corners into n - 2 triangles; takes the corners of a mesh that has triangles only.
+fn split_faces(raw: &mut RawMesh, stop: Stop<'_>) -> Result<Vec<u32>, Violations> {
     if raw.faces.are_triangles() {
         return Ok(std::mem::take(&mut raw.corners));
     }
-    let mut triangles = Vec::with_capacity(3 * raw.faces.triangles());
+    let mut triangles = Vec::with_capacity(3 * raw.triangles);
     let mut violations = Violations::default();
     let mut rest = raw.corners.as_slice();
     let (mut positions, mut places) = (Vec::new(), Vec::new());
     for (number, face) in raw.faces.iter().enumerate() {
         stop.check_every(FACES_PER_CHECK, number)?;
-        let (corners, others) = rest.split_at(face.corners);
+        let (corners, others) = rest.split_at(face.corners as usize);
         rest = others;
         if corners.len() == 3 {
             triangles.extend(corners);
@@ -257,13 +149,13 @@ fn split_faces(
         places.clear();
         match split(&positions, &mut places, stop)? {
             Split::Exact => {}
-            Split::Overlapping => overlapping.note(face.place),
+            Split::Overlapping => raw.oddities.note(Oddity::Overlapping, triangles.len() / 3),
             Split::TooManyCorners => {
                 let what = format!(
                     "a polygon that is not convex has {} corners; at most {MAX_CLIPPED_CORNERS} are allowed, split it into triangles",
                     face.corners
                 );
-                violations.add(Place(raw.places, face.place).to_string(), what);
+                violations.add(raw.places.named(face.place as usize), what);
             }
         }
         triangles.extend(places.iter().flatten().map(|&place| corners[place]));
@@ -272,8 +164,7 @@ fn split_faces(
     Ok(triangles)
 }
 
-/// Scales positions to metres, turns +Y up, rounds to single precision and merges equal ones; returns them with the new index of
-/// each vertex.
+/// Positions in metres with +Y up, in single precision and each once, and the new index of each vertex.
 fn weld(positions: &[DVec3], import: Import, stop: Stop<'_>) -> Result<(Vec<Vec3>, Vec<u32>), Stopped> {
     let mut known = HashMap::new();
     let mut welded = Vec::new();
@@ -282,14 +173,13 @@ fn weld(positions: &[DVec3], import: Import, stop: Stop<'_>) -> Result<(Vec<Vec3
         stop.check_every(VERTICES_PER_CHECK, number)?;
         // Adding zero turns −0 into 0, so that equal numbers have equal bits.
         let position = import.metres_from_file(position).as_vec3() + Vec3::ZERO;
-        indices.push(
-            *known
-                .entry(position.to_array().map(f32::to_bits))
-                .or_insert_with(|| {
-                    welded.push(position);
-                    welded.len() as u32 - 1
-                }),
-        );
+        let index = known
+            .entry(position.to_array().map(f32::to_bits))
+            .or_insert_with(|| {
+                welded.push(position);
+                welded.len() as u32 - 1
+            });
+        indices.push(*index);
     }
     Ok((welded, indices))
 }
@@ -314,13 +204,14 @@ struct Polygon {
 /// Gives polygons that repeat an earlier one, from any corner and in either winding, the triangles of that one: only then do they
 /// match. `welded` has the vertex of each of the file's, and `triangles` those of all faces, welded.
 fn split_alike(raw: &RawMesh, welded: &[u32], triangles: &mut [[u32; 3]]) {
+    let hasher = BuildHasherDefault::<DefaultHasher>::new();
     let mut polygons = Vec::new();
     let (mut first_corner, mut first_triangle) = (0, 0);
     for face in raw.faces.iter() {
-        let corners = face.corners;
+        let corners = face.corners as usize;
         if corners > 3 {
             let vertices = raw.corners[first_corner..first_corner + corners].iter();
-            let hashes = vertices.map(|&vertex| scattered(welded[vertex as usize]));
+            let hashes = vertices.map(|&vertex| hasher.hash_one(welded[vertex as usize]));
             polygons.push(Polygon {
                 hash: hashes.fold(0, u64::wrapping_add),
                 corners,
@@ -354,12 +245,4 @@ fn split_alike(raw: &RawMesh, welded: &[u32], triangles: &mut [[u32; 3]]) {
             }
         }
     }
-}
-
-/// A number whose bits all depend on a vertex: the finaliser of `SplitMix64`.
-fn scattered(vertex: u32) -> u64 {
-    let number = u64::from(vertex) + 0x9e37_79b9_7f4a_7c15;
-    let number = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let number = (number ^ (number >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    number ^ (number >> 31)
 }

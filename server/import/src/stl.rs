@@ -2,22 +2,19 @@
 
 use std::ops::RangeInclusive;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use grasp_synthesis::base::stop::Stop;
 
 use crate::{
     MeshLimits,
     error::{ImportError, Violations},
-    raw::{Places, RawMesh, check_counts},
-    text::{number, plain_lines, shown, without_mark},
+    raw::{Oddity, Places, RawMesh, check_counts},
+    text::{number, plain_lines, shown, split_words, without_mark},
 };
 
 /// Bytes of a binary file before its triangles, and per triangle.
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
-
-/// The bytes of a triangle's corners, behind its normal.
-const CORNERS: std::ops::Range<usize> = 12..48;
 
 /// First words of the lines of a facet in text.
 const FACET: [&[u8]; 7] = [
@@ -48,14 +45,12 @@ pub(crate) fn is_binary(bytes: &[u8]) -> bool {
     }
     let present = (rest.len() / TRIANGLE_BYTES) as u64;
     let is_near = (present / 2..=present.saturating_mul(100)).contains(&claimed);
-    let numbers = rest
-        .get(..TRIANGLE_BYTES - 2)
-        .map(|numbers| numbers.as_chunks().0);
-    is_near
-        && numbers.is_some_and(|numbers| {
-            let mut numbers = numbers.iter().map(|&number| f32::from_le_bytes(number).abs());
-            numbers.all(|number| number == 0.0 || USUAL_NUMBERS.contains(&number))
-        })
+    let is_usual = |&number: &[u8; 4]| {
+        let number = f32::from_le_bytes(number).abs();
+        number == 0.0 || USUAL_NUMBERS.contains(&number)
+    };
+    let numbers = rest.get(..TRIANGLE_BYTES - 2);
+    is_near && numbers.is_some_and(|numbers| numbers.as_chunks().0.iter().all(is_usual))
 }
 
 fn claimed_triangles(bytes: &[u8]) -> Option<u64> {
@@ -74,21 +69,17 @@ pub(crate) fn read_binary(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> R
         let what = format!("is cut off: it claims {claimed} triangles and has {present}");
         return Err(ImportError::at("the STL file", what).into());
     }
-    let mut raw = RawMesh::new(Places::Triangles);
+    let mut raw = RawMesh::new("the STL mesh", Places::Triangles);
     let names = raw.names.add_part("");
     raw.positions.reserve(3 * claimed);
     raw.corners.reserve(3 * claimed);
     for (place, triangle) in triangles.take(claimed).enumerate() {
         stop.check_every(STEPS_PER_CHECK, place)?;
-        let numbers = triangle[CORNERS]
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&number| f32::from_le_bytes(number));
-        let numbers: Vec<f32> = numbers.collect();
-        let corners = numbers.as_chunks::<3>().0.iter();
-        raw.positions
-            .extend(corners.map(|&corner| Vec3::from_array(corner).as_dvec3()));
+        // Behind its normal, nine numbers.
+        let numbers = triangle[12..48].as_chunks().0.iter();
+        let numbers: Vec<f64> = numbers.map(|&number| f32::from_le_bytes(number).into()).collect();
+        let corners = numbers.as_chunks().0.iter();
+        raw.positions.extend(corners.copied().map(DVec3::from_array));
         let first = 3 * place as u32;
         raw.add_triangle([first, first + 1, first + 2], place, names);
     }
@@ -102,43 +93,31 @@ pub(crate) fn read_binary(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> R
 
 /// Reads a text file, in any case.
 pub(crate) fn read_text(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Violations> {
-    let mut raw = RawMesh::new(Places::Lines);
+    let mut raw = RawMesh::new("the STL mesh", Places::Lines);
     let mut names = raw.names.add_part("");
     let (mut step, mut facet_line) = (0, 0);
     let wrong = |facet: usize, what: String| ImportError::at(format!("the STL facet on line {facet}"), what);
     for (line_number, line) in (1..).zip(plain_lines(without_mark(bytes))) {
         stop.check_every(STEPS_PER_CHECK, line_number)?;
         let line = line.trim_ascii();
-        let words = line
-            .split(u8::is_ascii_whitespace)
-            .filter(|word| !word.is_empty());
-        let words: Vec<&[u8]> = words.collect();
-        let keyword = words
-            .first()
-            .map(|word| word.to_ascii_lowercase())
-            .unwrap_or_default();
+        let words: Vec<&[u8]> = split_words(line).collect();
+        let keyword = words.first().copied().unwrap_or_default().to_ascii_lowercase();
         if keyword == b"solid" {
-            names = raw
-                .names
-                .add_part(&String::from_utf8_lossy(line[keyword.len()..].trim_ascii()));
+            let name = String::from_utf8_lossy(line[keyword.len()..].trim_ascii());
+            names = raw.names.add_part(&name);
         } else if FACET.contains(&keyword.as_slice()) {
             if step == 0 {
                 facet_line = line_number;
             }
             if keyword != FACET[step] {
-                let expected = String::from_utf8_lossy(FACET[step]);
-                let what = format!(
-                    "has {:?} on line {line_number}; {expected} must be there",
-                    shown(line)
-                );
+                let (found, expected) = (shown(line), shown(FACET[step]));
+                let what = format!("has {found:?} on line {line_number}; {expected} must be there");
                 return Err(wrong(facet_line, what).into());
             }
             if keyword == b"vertex" {
                 let &[_, x, y, z] = words.as_slice() else {
-                    let what = format!(
-                        "has {:?} on line {line_number}; a vertex has three numbers",
-                        shown(line)
-                    );
+                    let found = shown(line);
+                    let what = format!("has {found:?} on line {line_number}; a vertex has three numbers");
                     return Err(wrong(facet_line, what).into());
                 };
                 let mut position = [0.0; 3];
@@ -152,14 +131,14 @@ pub(crate) fn read_text(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Res
             if step == 0 {
                 let first = raw.positions.len() as u32 - 3;
                 raw.add_triangle([first, first + 1, first + 2], facet_line, names);
-                check_counts(0, raw.faces.triangles() as u64, limits)?;
+                check_counts(0, raw.triangles as u64, limits)?;
             }
         } else if !matches!(keyword.as_slice(), b"" | b"endsolid") {
-            raw.unknown.note(line_number);
+            raw.oddities.note(Oddity::UnknownLine, line_number);
         }
     }
     if step > 0 {
-        let expected = String::from_utf8_lossy(FACET[step]);
+        let expected = shown(FACET[step]);
         return Err(wrong(facet_line, format!("is cut off before {expected}")).into());
     }
     Ok(raw)

@@ -109,15 +109,18 @@ pub(crate) fn cut(text: &[u8]) -> (&[u8], Option<&[u8]>) {
 }
 
 fn has_comment(line: &[u8]) -> bool {
+    split_words(line).any(|word| word[0] == b'#')
+}
+
+/// The words of a line.
+pub(crate) fn split_words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
     line.split(u8::is_ascii_whitespace)
-        .any(|word| word.first() == Some(&b'#'))
+        .filter(|word| !word.is_empty())
 }
 
 /// The words of a line, up to a comment.
 pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
-    line.split(u8::is_ascii_whitespace)
-        .filter(|word| !word.is_empty())
-        .take_while(|word| word[0] != b'#')
+    split_words(line).take_while(|word| word[0] != b'#')
 }
 
 /// A word for a message: truncated, and with invalid UTF-8 replaced.
@@ -138,10 +141,10 @@ pub(crate) fn number(line: usize, word: &[u8]) -> Result<f64, ImportError> {
     match parsed::<f64>(word) {
         Some(number) if number.is_finite() => Ok(number),
         Some(_) => Err(not_finite(line, word)),
-        None => Err(ImportError::on_line(
-            line,
-            format!("{:?} is not a number", shown(word)),
-        )),
+        None => {
+            let what = format!("{:?} is not a number", shown(word));
+            Err(ImportError::on_line(line, what))
+        }
     }
 }
 
@@ -151,8 +154,7 @@ pub(crate) fn not_finite(line: usize, word: &[u8]) -> ImportError {
     ImportError::on_line(line, what)
 }
 
-/// The words of a name in lower case: parts between other characters than letters and digits, and before capital letters and
-/// numbers.
+/// The words of a name in lower case, which end at other characters than letters and digits, and before capitals and numbers.
 pub(crate) fn name_words(name: &str) -> Vec<String> {
     let characters: Vec<char> = name.chars().take(MAX_CHARACTERS).collect();
     let mut words: Vec<String> = Vec::new();

@@ -12,7 +12,7 @@ use grasp_synthesis::base::stop::{Stop, Stopped};
 
 use crate::{
     edges::{EdgeUse, Sets, by_edge},
-    raw::Occurrences,
+    raw::{Oddities, Oddity},
 };
 
 /// Marks a triangle without a patch.
@@ -27,34 +27,25 @@ const MIN_WORK: usize = 1 << 16;
 /// Share of a box's volume below which an enclosed volume counts as rounding error.
 const NO_VOLUME: f64 = 1e-9;
 
-/// The triangles that were turned.
-#[derive(Debug, Default)]
-pub(crate) struct TurnedTriangles {
-    /// Triangles that disagreed with the rest of their patch.
-    pub(crate) disagreeing: Occurrences,
-    /// Triangles of closed parts that were inside out.
-    pub(crate) inside_out: Occurrences,
-}
-
-/// Turns triangles, and the uses of their edges.
+/// Turns triangles, which it notes, and the uses of their edges.
 pub(crate) fn face_outward(
     positions: &[Vec3],
     triangles: &mut [[u32; 3]],
     uses: &mut [EdgeUse],
+    oddities: &mut Oddities,
     stop: Stop<'_>,
-) -> Result<TurnedTriangles, Stopped> {
+) -> Result<(), Stopped> {
     let mut patches = Patches::of(triangles.len(), uses);
     patches.keep_larger_side(positions, triangles);
     turn(triangles, uses, &patches.turns);
     stop.check()?;
 
     let sets = patches.closed(uses).into_iter();
-    let parts: Vec<ClosedPart> = sets
-        .map(|set| {
-            let members = set.iter().flat_map(|&patch| patches.members(patch)).copied();
-            ClosedPart::new(members.collect(), positions, triangles)
-        })
-        .collect();
+    let parts = sets.map(|set| {
+        let members = set.iter().flat_map(|&patch| patches.members(patch)).copied();
+        ClosedPart::new(members.collect(), positions, triangles)
+    });
+    let parts: Vec<ClosedPart> = parts.collect();
     let mut is_inward = vec![false; triangles.len()];
     for part in facing_inward(&parts, positions, triangles, stop)? {
         for &triangle in &parts[part].triangles {
@@ -63,18 +54,18 @@ pub(crate) fn face_outward(
     }
     turn(triangles, uses, &is_inward);
 
-    let mut turned = TurnedTriangles::default();
     for (triangle, &inward) in is_inward.iter().enumerate() {
         if patches.turns[triangle] != inward {
-            let patch = &patches.list[patches.of[triangle] as usize];
-            if patch.is_mixed {
-                turned.disagreeing.note(triangle);
+            let is_mixed = patches.list[patches.of[triangle] as usize].is_mixed;
+            let oddity = if is_mixed {
+                Oddity::Disagreeing
             } else {
-                turned.inside_out.note(triangle);
-            }
+                Oddity::InsideOut
+            };
+            oddities.note(oddity, triangle);
         }
     }
-    Ok(turned)
+    Ok(())
 }
 
 /// Turns the chosen triangles.
@@ -170,10 +161,7 @@ impl Patches {
         let mut next = start;
         while let Some(&triangle) = self.members.get(next) {
             let triangle = triangle as usize;
-            for (other, opposes) in neighbours[triangle]
-                .iter()
-                .filter_map(|neighbour| neighbour.parts())
-            {
+            for (other, opposes) in neighbours[triangle].iter().filter_map(|other| other.parts()) {
                 let turns = self.turns[triangle] != opposes;
                 if self.of[other] == NO_PATCH {
                     self.of[other] = patch;
@@ -264,11 +252,10 @@ impl Patches {
     /// How often each patch at an edge passes it forward, less how often backward.
     fn balance(&self, users: &[EdgeUse], balances: &mut Vec<(u32, i32)>) {
         balances.clear();
-        balances.extend(
-            users
-                .iter()
-                .map(|edge| (self.of[edge.triangle()], edge.direction())),
-        );
+        let directions = users
+            .iter()
+            .map(|edge| (self.of[edge.triangle()], edge.direction()));
+        balances.extend(directions);
         balances.sort_unstable();
         balances.dedup_by(|next, kept| {
             let is_same = next.0 == kept.0;
@@ -345,9 +332,8 @@ fn facing_inward(
     if parts.iter().all(|part| part.volume >= 0.0) {
         return Ok(Vec::new());
     }
-    let mut by_volume: Vec<usize> = (0..parts.len())
-        .filter(|&part| parts[part].volume != 0.0)
-        .collect();
+    let with_volume = (0..parts.len()).filter(|&part| parts[part].volume != 0.0);
+    let mut by_volume: Vec<usize> = with_volume.collect();
     by_volume.sort_by(|&a, &b| parts[b].volume.abs().total_cmp(&parts[a].volume.abs()));
     let mut work = MIN_WORK + WORK_PER_TRIANGLE * triangles.len();
     let mut outermost: Vec<usize> = Vec::new();

@@ -2,6 +2,7 @@
 
 mod fingers;
 pub mod names;
+pub mod ring;
 
 use glam::{Mat4, Quat, Vec3};
 use gltf::binary::{Glb, Header};

@@ -2,10 +2,8 @@
 
 use std::{
     collections::BTreeMap,
-    f32::consts::{PI, TAU},
-    fmt::Write as _,
+    f32::consts::PI,
     fs,
-    iter::repeat_n,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
@@ -14,7 +12,10 @@ use std::{
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use glam::Vec3;
 use grasp_assets::hands::hand;
-use grasp_characters::glb;
+use grasp_characters::{
+    glb,
+    ring::{Ring, floats},
+};
 use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_synthesis::{
     base::stop::unstopped,
@@ -46,186 +47,68 @@ const LIMITS: MeshLimits = MeshLimits {
     triangles: 200_000,
 };
 
-/// A torus of quads, which has neither rim nor poles.
-struct Torus {
-    positions: Vec<[f32; 3]>,
-    quads: Vec<[u32; 4]>,
+/// A ring whose coordinates have five digits, as files have them.
+fn rounded_ring() -> Ring {
+    let mut ring = Ring::at([0.0; 3], SIDE);
+    for number in ring.positions.as_flattened_mut() {
+        *number = (*number * 1e5).round() / 1e5;
+    }
+    ring
 }
 
-impl Torus {
-    fn new() -> Self {
-        let angle = |step: u32| TAU * step as f32 / SIDE as f32;
-        let steps = || (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| (row, column)));
-        let position = |(row, column)| {
-            let ((sin, cos), (height, out)) = (angle(row).sin_cos(), angle(column).sin_cos());
-            let radius = 0.05 + 0.02 * out;
-            [radius * cos, radius * sin, 0.02 * height]
-        };
-        let vertex = |row: u32, column: u32| (row % SIDE) * SIDE + column % SIDE;
-        let quad = |(row, column)| {
-            [
-                vertex(row, column),
-                vertex(row + 1, column),
-                vertex(row + 1, column + 1),
-                vertex(row, column + 1),
-            ]
-        };
-        Self {
-            positions: steps().map(position).collect(),
-            quads: steps().map(quad).collect(),
-        }
-    }
+/// The document of a ring without names, with more members of its buffer.
+fn nameless(ring: &Ring, buffer: &str) -> Value {
+    let mut document: Value = serde_json::from_str(&ring.gltf_json("", buffer)).expect("it is JSON");
+    document["nodes"] = json!([{"mesh": 0}]);
+    document["materials"] = json!([{}]);
+    document["meshes"][0]["name"].take();
+    document
+}
 
-    fn triangles(&self) -> impl Iterator<Item = [u32; 3]> {
-        self.quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-    }
+fn glb_of_16_bits(ring: &Ring) -> Vec<u8> {
+    let mut document = nameless(ring, "");
+    let mut buffer = floats(ring.positions.as_flattened());
+    let indices = ring.triangles.as_flattened().iter();
+    buffer.extend(indices.flat_map(|&index| (index as u16).to_le_bytes()));
+    document["accessors"][1]["componentType"] = 5123.into();
+    document["bufferViews"][1]["byteLength"] = (6 * ring.triangles.len()).into();
+    document["buffers"][0]["byteLength"] = buffer.len().into();
+    glb(&document, buffer)
+}
 
-    fn corners(&self) -> impl Iterator<Item = [[f32; 3]; 3]> {
-        let position = |vertex: u32| self.positions[vertex as usize];
-        self.triangles().map(move |corners| corners.map(position))
-    }
-
-    /// Its triangles and quads take turns, or all faces are triangles.
-    fn obj(&self, has_quads: bool) -> Vec<u8> {
-        let mut text = String::new();
-        for [x, y, z] in &self.positions {
-            let _ = writeln!(text, "v {x:.5} {y:.5} {z:.5}");
-        }
-        for (place, quad) in self.quads.iter().enumerate() {
-            let [a, b, c, d] = quad.map(|vertex| vertex + 1);
-            let _ = if has_quads && place % 2 == 1 {
-                writeln!(text, "f {a} {b} {c} {d}")
-            } else {
-                writeln!(text, "f {a} {b} {c}\nf {a} {c} {d}")
-            };
-        }
-        text.into_bytes()
-    }
-
-    fn stl_text(&self) -> Vec<u8> {
-        let mut text = "solid torus\n".to_owned();
-        for corners in self.corners() {
-            text.push_str("facet normal 0 0 0\nouter loop\n");
-            for [x, y, z] in corners {
-                let _ = writeln!(text, "vertex {x:.5} {y:.5} {z:.5}");
-            }
-            text.push_str("endloop\nendfacet\n");
-        }
-        text.push_str("endsolid torus\n");
-        text.into_bytes()
-    }
-
-    /// Binary STL whose header starts as text does.
-    fn stl_binary(&self) -> Vec<u8> {
-        let mut bytes = b"solid".to_vec();
-        bytes.extend(repeat_n(0, 75));
-        bytes.extend((self.triangles().count() as u32).to_le_bytes());
-        for corners in self.corners() {
-            bytes.extend([0; 12]);
-            bytes.extend(corners.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
-            bytes.extend([0; 2]);
-        }
-        bytes
-    }
-
-    fn ply_header(&self, format: &str) -> String {
-        format!(
-            "ply\nformat {format} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-             element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-            self.positions.len(),
-            self.triangles().count()
-        )
-    }
-
-    fn ply_text(&self) -> Vec<u8> {
-        let mut text = self.ply_header("ascii");
-        for [x, y, z] in &self.positions {
-            let _ = writeln!(text, "{x:.5} {y:.5} {z:.5}");
-        }
-        for [a, b, c] in self.triangles() {
-            let _ = writeln!(text, "3 {a} {b} {c}");
-        }
-        text.into_bytes()
-    }
-
-    fn ply_binary(&self) -> Vec<u8> {
-        let mut bytes = self.ply_header("binary_little_endian").into_bytes();
-        bytes.extend(self.coordinates());
-        for corners in self.triangles() {
-            bytes.push(3);
-            bytes.extend(corners.iter().flat_map(|corner| corner.to_le_bytes()));
-        }
-        bytes
-    }
-
-    fn coordinates(&self) -> impl Iterator<Item = u8> {
-        let coordinates = self.positions.as_flattened().iter();
-        coordinates.flat_map(|x| x.to_le_bytes())
-    }
-
-    /// A scene with one primitive, and its buffer. `component` is the type of indices as glTF numbers it.
-    fn gltf(&self, component: u32, indices: &[u8]) -> (Value, Vec<u8>) {
-        let buffer: Vec<u8> = self.coordinates().chain(indices.iter().copied()).collect();
-        let (vertices, of_positions) = (self.positions.len(), 12 * self.positions.len());
-        let document = json!({
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-            "buffers": [{"byteLength": buffer.len()}],
-            "bufferViews": [
-                {"buffer": 0, "byteOffset": 0, "byteLength": of_positions},
-                {"buffer": 0, "byteOffset": of_positions, "byteLength": indices.len()},
-            ],
-            "accessors": [
-                {"bufferView": 0, "componentType": 5126, "count": vertices, "type": "VEC3",
-                 "min": [-0.07, -0.07, -0.02], "max": [0.07, 0.07, 0.02]},
-                {"bufferView": 1, "componentType": component, "count": 3 * self.triangles().count(), "type": "SCALAR"},
-            ],
-        });
-        (document, buffer)
-    }
-
-    fn glb_of_16_bits(&self) -> Vec<u8> {
-        let indices = self.triangles().flatten().map(|index| index as u16);
-        let (document, buffer) = self.gltf(5123, &indices.flat_map(u16::to_le_bytes).collect::<Vec<_>>());
-        glb(&document, buffer)
-    }
-
-    fn gltf_text(&self) -> Vec<u8> {
-        let indices: Vec<u8> = self.triangles().flatten().flat_map(u32::to_le_bytes).collect();
-        let (mut document, buffer) = self.gltf(5125, &indices);
-        let data = BASE64_STANDARD.encode(&buffer);
-        document["buffers"][0]["uri"] = format!("data:application/octet-stream;base64,{data}").into();
-        document.to_string().into_bytes()
-    }
+fn gltf_text(ring: &Ring) -> Vec<u8> {
+    let data = BASE64_STANDARD.encode(ring.buffer());
+    let uri = format!(r#","uri":"data:application/octet-stream;base64,{data}""#);
+    nameless(ring, &uri).to_string().into_bytes()
 }
 
 /// Writes a file.
-type Write = fn(&Torus) -> Vec<u8>;
+type Write = fn(&Ring) -> Vec<u8>;
 
 #[test]
 fn reading_takes_at_most_six_times_the_file() {
     let _alone = alone();
-    let torus = Torus::new();
+    let ring = rounded_ring();
     let files: [(&str, Write); 8] = [
-        ("OBJ of triangles", |torus| torus.obj(false)),
-        ("OBJ of both", |torus| torus.obj(true)),
-        ("STL text", Torus::stl_text),
-        ("binary STL", Torus::stl_binary),
-        ("PLY text", Torus::ply_text),
-        ("binary PLY", Torus::ply_binary),
-        ("GLB of 16 bits", Torus::glb_of_16_bits),
-        ("glTF text", Torus::gltf_text),
+        ("OBJ of triangles", |ring| ring.obj(false)),
+        ("OBJ of both", |ring| ring.obj(true)),
+        ("STL text", Ring::stl_text),
+        ("binary STL", Ring::stl_binary),
+        ("PLY text", |ring| ring.ply("ascii")),
+        ("binary PLY", |ring| ring.ply("binary_little_endian")),
+        ("GLB of 16 bits", glb_of_16_bits),
+        ("glTF text", gltf_text),
     ];
     let mut too_much = Vec::new();
     for (name, write) in files {
-        let file = write(&torus);
+        let file = write(&ring);
         let before = ALLOCATOR.current_usage();
         ALLOCATOR.reset_peak_usage();
-        let read = read_mesh(&file, Import::METRES, LIMITS).expect("the torus is sound");
+        let read = read_mesh(&file, Import::METRES, LIMITS).expect("the ring is sound");
         let peak = ALLOCATOR.peak_usage() - before;
         let share = peak as f64 / file.len() as f64;
         println!("{name}: {share:.2} times {} bytes", file.len());
-        assert_eq!(read.mesh.triangles().len(), torus.triangles().count(), "{name}");
+        assert_eq!(read.mesh.triangles().len(), ring.triangles.len(), "{name}");
         assert_eq!(read.warnings, [""; 0], "{name}");
         if peak > BYTES_PER_BYTE * file.len() {
             too_much.push(format!("{name}: {share:.2}"));
@@ -303,14 +186,10 @@ fn meshes(root: &Path) -> Vec<String> {
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).into_iter().flatten() {
             let path = entry.unwrap().path();
-            let extension = path
-                .extension()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
+            let extension = path.extension().unwrap_or_default().to_str();
             if path.is_dir() {
                 folders.push(path);
-            } else if ["obj", "stl", "ply", "glb", "gltf"].contains(&extension.as_str()) {
+            } else if extension.is_some_and(|own| ["obj", "stl", "ply", "glb", "gltf"].contains(&own)) {
                 found.push(path.strip_prefix(root).unwrap().to_string_lossy().into_owned());
             }
         }
@@ -335,11 +214,8 @@ fn ellipsoid(side: u32) -> TriangleMesh {
     let point = |row: u32, column: u32| {
         let polar = PI * row as f32 / side as f32;
         let around = 2.0 * PI * column as f32 / side as f32;
-        let direction = Vec3::new(
-            polar.sin() * around.cos(),
-            polar.sin() * around.sin(),
-            polar.cos(),
-        );
+        let (sin, cos) = polar.sin_cos();
+        let direction = Vec3::new(sin * around.cos(), sin * around.sin(), cos);
         direction * Vec3::new(0.026, 0.018, 0.06) * (1.0 + 0.04 * (3.0 * polar).sin() * (4.0 * around).sin())
     };
     let mut positions = vec![point(0, 0), point(side, 0)];
@@ -352,12 +228,8 @@ fn ellipsoid(side: u32) -> TriangleMesh {
     let mut triangles = Vec::with_capacity((2 * side * (side - 1)) as usize);
     for row in 0..side {
         for column in 0..side {
-            let [a, b, c, d] = [
-                at(row, column),
-                at(row + 1, column),
-                at(row + 1, column + 1),
-                at(row, column + 1),
-            ];
+            let [a, b] = [row, row + 1].map(|row| at(row, column));
+            let [d, c] = [row, row + 1].map(|row| at(row, column + 1));
             if row + 1 < side {
                 triangles.push([a, b, c]);
             }

@@ -23,13 +23,9 @@ const JOINT_SETS: u32 = 4;
 
 /// Appends all triangles that a scene shows, and those that it would show elsewhere or nearer, marked as such.
 pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>) -> Result<(), ImportError> {
-    let Opened {
-        json,
-        document,
-        buffers,
-    } = opened;
+    let (document, buffers) = (&opened.document, &opened.buffers);
     let scene = Scene::of(document);
-    let extended = Extended::of(json)?;
+    let extended = Extended::of(&opened.json)?;
     let drawn = drawn_nodes(&scene, document, &extended, &mut raw.names);
     let nodes: Vec<Node<'_>> = document.nodes().collect();
     // Each name once: scenes may show a part with a long one thousands of times.
@@ -107,8 +103,8 @@ pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>) -> Result<(), Im
         }
     }
     if skipped > 0 {
-        raw.warnings
-            .push(format!("{skipped} primitives of points or lines were ignored"));
+        let skipped = format!("{skipped} primitives of points or lines were ignored");
+        raw.warnings.push(skipped);
     }
     let undrawn = document.meshes().filter(|mesh| !is_drawn[mesh.index()]);
     let undrawn: Vec<Mesh<'_>> = undrawn.collect();
@@ -130,7 +126,7 @@ struct ShownPrimitive {
     indices: Vec<u32>,
     mode: Mode,
     is_skinned: bool,
-    names: usize,
+    names: u32,
 }
 
 impl ShownPrimitive {
@@ -143,7 +139,7 @@ impl ShownPrimitive {
     ) -> Result<(), ImportError> {
         buffers.spend(0)?;
         let triangles = triangles(&self.indices, self.mode);
-        let (first, before) = (raw.positions.len(), raw.faces.triangles());
+        let (first, before) = (raw.positions.len(), raw.triangles);
         let vertices = (first + self.positions.len()) as u64;
         check_counts(vertices, (before + triangles.len()) as u64, buffers.limits)?;
         raw.positions.extend(self.positions.iter().map(|&position| {
@@ -206,20 +202,18 @@ fn indices(
     let index_of = |[number]: [f64; 1]| if number >= 0.0 { number as u32 } else { u32::MAX };
     let indices = buffers.read(&accessor, accessor.count(), index_of)?;
     match indices.iter().find(|&&index| index as usize >= vertices) {
-        Some(index) => Err(ImportError::at(
-            "indices",
-            format!("vertex {index} does not exist; there are {vertices}, counted from 0"),
-        )),
+        Some(index) => {
+            let what = format!("vertex {index} does not exist; there are {vertices}, counted from 0");
+            Err(ImportError::at("indices", what))
+        }
         None => Ok(indices),
     }
 }
 
 /// Whether a primitive is a list, strip or fan of triangles.
 fn has_triangles(primitive: &Primitive<'_>) -> bool {
-    matches!(
-        primitive.mode(),
-        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-    )
+    use Mode::{TriangleFan, TriangleStrip, Triangles};
+    matches!(primitive.mode(), Triangles | TriangleStrip | TriangleFan)
 }
 
 /// The triangles of a list, strip or fan of indices.
@@ -249,15 +243,16 @@ fn instances(
     document: &Document,
     buffers: &Buffers<'_>,
 ) -> Result<Vec<DMat4>, ImportError> {
-    let accessor = |index: Option<usize>| -> Result<Option<Accessor<'_>>, ImportError> {
-        let Some(index) = index else { return Ok(None) };
-        let found = document.accessors().nth(index);
+    let accessor = |index: usize| {
         let what = || format!("refers to accessors[{index}], which does not exist");
-        found.map(Some).ok_or_else(|| ImportError::at(EXTENSION, what()))
+        document
+            .accessors()
+            .nth(index)
+            .ok_or_else(|| ImportError::at(EXTENSION, what()))
     };
-    let translation = accessor(attributes.translation)?;
-    let rotation = accessor(attributes.rotation)?;
-    let scale = accessor(attributes.scale)?;
+    let translation = attributes.translation.map(accessor).transpose()?;
+    let rotation = attributes.rotation.map(accessor).transpose()?;
+    let scale = attributes.scale.map(accessor).transpose()?;
     let all = [&translation, &rotation, &scale].into_iter().flatten();
     let mut counts = all.map(Accessor::count);
     let Some(count) = counts.next() else {
@@ -281,11 +276,10 @@ fn instances(
         None => vec![DQuat::IDENTITY; count],
     };
     let at = scales.into_iter().zip(rotations).zip(translations);
-    Ok(at
-        .map(|((scale, rotation), translation)| {
-            DMat4::from_scale_rotation_translation(scale, rotation.normalize(), translation)
-        })
-        .collect())
+    let at = at.map(|((scale, rotation), translation)| {
+        DMat4::from_scale_rotation_translation(scale, rotation.normalize(), translation)
+    });
+    Ok(at.collect())
 }
 
 /// A primitive as its joints move it.
@@ -339,9 +333,8 @@ fn joints_at(
     frame_of: impl Fn(usize) -> DMat4,
 ) -> Result<Vec<DMat4>, ImportError> {
     let bound = skin.joints().zip(inverse_binds(skin, buffers)?);
-    Ok(bound
-        .map(|(joint, inverse_bind)| frame_of(joint.index()) * inverse_bind)
-        .collect())
+    let joints = bound.map(|(joint, inverse_bind)| frame_of(joint.index()) * inverse_bind);
+    Ok(joints.collect())
 }
 
 /// The transforms of a skin's joints from the frame of the mesh, where it was bound.
@@ -363,13 +356,10 @@ fn skinned(
 ) -> Result<Vec<DVec3>, ImportError> {
     let mut sums = vec![(DVec3::ZERO, 0.0); positions.len()];
     each_weight(primitive, positions.len(), buffers, |vertex, joint, weight| {
-        let transform = joints.get(joint).ok_or_else(|| {
-            let known = joints.len();
-            ImportError::at(
-                "attributes",
-                format!("joint {joint} does not exist; there are {known}"),
-            )
-        })?;
+        let what = || format!("joint {joint} does not exist; there are {}", joints.len());
+        let transform = joints
+            .get(joint)
+            .ok_or_else(|| ImportError::at("attributes", what()))?;
         let (sum, total) = &mut sums[vertex];
         *sum += weight * transform.transform_point3(positions[vertex]);
         *total += weight;
@@ -377,9 +367,8 @@ fn skinned(
     })?;
     // Vertices without weights stay where they are.
     let moved = sums.into_iter().zip(positions);
-    Ok(moved
-        .map(|((sum, total), &position)| if total > 0.0 { sum / total } else { position })
-        .collect())
+    let moved = moved.map(|((sum, total), &position)| if total > 0.0 { sum / total } else { position });
+    Ok(moved.collect())
 }
 
 /// Calls `each` with every vertex, joint of it (by its place in the skin) and weight other than 0.
@@ -390,11 +379,8 @@ pub(crate) fn each_weight(
     mut each: impl FnMut(usize, usize, f64) -> Result<(), ImportError>,
 ) -> Result<(), ImportError> {
     for set in 0..JOINT_SETS {
-        let sets = (
-            primitive.get(&Semantic::Joints(set)),
-            primitive.get(&Semantic::Weights(set)),
-        );
-        let (Some(indices), Some(weights)) = sets else {
+        let joints = primitive.get(&Semantic::Joints(set));
+        let Some((indices, weights)) = joints.zip(primitive.get(&Semantic::Weights(set))) else {
             break;
         };
         let indices = buffers.read::<4, _>(&indices, vertices, |joints| joints)?;

@@ -41,13 +41,10 @@ const LISTED_EXTENSIONS: usize = 8;
 /// Reads the default scene, or the first one; all nodes if there is none.
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Violations> {
     let opened = open(bytes, limits, stop)?;
-    let mut raw = RawMesh::new(Places::Triangles);
+    let mut raw = RawMesh::new("the glTF scene", Places::Triangles);
     meshes::read_into(&mut raw, &opened)?;
-    let unknown = opened
-        .document
-        .extensions_used()
-        .filter(|extension| may_be_missed(extension));
-    for extension in unknown.take(LISTED_EXTENSIONS) {
+    let used = opened.document.extensions_used();
+    for extension in used.filter(|used| may_be_missed(used)).take(LISTED_EXTENSIONS) {
         raw.warnings.push(format!(
             "the file uses the extension {}, which is not read: what it adds to the shape or changes of it is missing",
             quoted(extension)
@@ -80,13 +77,10 @@ pub(crate) fn open<'a>(
     let mut root: Root = deserialize::from_slice(&json)
         .map_err(|error| ImportError::at("the glTF document", error.to_string()))?;
     let mut refused = Violations::default();
-    for extension in root
-        .extensions_required
-        .iter()
+    let required = root.extensions_required.iter();
+    required
         .filter(|extension| !can_be_required(extension))
-    {
-        refused.push(refusal(extension));
-    }
+        .for_each(|extension| refused.push(refusal(extension)));
     refused.into_result()?;
     strip(&mut root);
     stop.check()?;
@@ -145,9 +139,8 @@ fn strip(root: &mut Root) {
     root.samplers.clear();
     root.textures.clear();
     for material in &mut root.materials {
-        let name = material.name.take();
         *material = gltf::json::Material {
-            name,
+            name: material.name.take(),
             ..Default::default()
         };
     }
@@ -212,9 +205,8 @@ fn decode<'a>(
                 Cow::Owned(decoded.map_err(|error| wrong(error.to_string()))?)
             }
             Source::Uri(_) => {
-                return Err(wrong(
-                    "is in another file; embed the buffers, or send a GLB".to_owned(),
-                ));
+                let what = "is in another file; embed the buffers, or send a GLB";
+                return Err(wrong(what.to_owned()));
             }
         };
         let (claimed, found) = (buffer.length(), bytes.len());
@@ -223,7 +215,13 @@ fn decode<'a>(
         }
         buffers.push(bytes);
     }
-    Ok(Buffers::new(buffers, limits, stop))
+    let largest = limits.vertices as u64 + 3 * limits.triangles as u64;
+    Ok(Buffers {
+        contents: buffers,
+        limits,
+        left: Cell::new(READS.saturating_mul(largest)),
+        stop,
+    })
 }
 
 /// How often, on average, each vertex and index of the largest mesh may be read: for morph targets, joints and weights.
@@ -240,26 +238,13 @@ pub(crate) struct Buffers<'a> {
 }
 
 impl<'a> Buffers<'a> {
-    fn new(contents: Vec<Bytes<'a>>, limits: MeshLimits, stop: Stop<'a>) -> Self {
-        let largest = limits.vertices as u64 + 3 * limits.triangles as u64;
-        Self {
-            contents,
-            limits,
-            left: Cell::new(READS.saturating_mul(largest)),
-            stop,
-        }
-    }
-
     /// Counts elements that are about to be read, and ends reading if it should.
     pub(crate) fn spend(&self, elements: u64) -> Result<(), ImportError> {
         self.stop.check()?;
         let left = self.left.get().checked_sub(elements.saturating_add(1));
-        self.left.set(left.ok_or_else(|| {
-            ImportError::at(
-                "the scene",
-                "repeats its meshes, joints or morph targets too often to be read",
-            )
-        })?);
+        let what = "repeats its meshes, joints or morph targets too often to be read";
+        self.left
+            .set(left.ok_or_else(|| ImportError::at("the scene", what))?);
         Ok(())
     }
 

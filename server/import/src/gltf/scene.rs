@@ -110,10 +110,8 @@ pub(super) fn drawn_nodes(
     names: &mut NameSets,
 ) -> Vec<DrawnNode> {
     let count = document.nodes().len();
-    let lower_levels: Vec<(usize, usize)> = extended
-        .lower_levels()
-        .filter(|&(level, _)| level < count)
-        .collect();
+    let lower_levels = extended.lower_levels().filter(|&(level, _)| level < count);
+    let lower_levels: Vec<(usize, usize)> = lower_levels.collect();
     let mut asides = vec![None; count];
     for &(level, _) in &lower_levels {
         asides[level] = Some(Aside::LowerLevel);
@@ -141,9 +139,8 @@ pub(super) fn drawn_nodes(
         let named = nodes[node]
             .name()
             .filter(|name| Role::of(name, &mut |_| 0) != Role::Part(0));
-        roles[node] = named
-            .map(|name| names.intern(name))
-            .or_else(|| parent.and_then(|parent| roles[parent]));
+        let named = named.map(|name| names.intern(name));
+        roles[node] = named.or_else(|| roles[parent?]);
         if nodes[node].mesh().is_some() {
             drawn.push(DrawnNode {
                 node,
@@ -175,13 +172,15 @@ pub(super) fn drawn_nodes(
 
 /// Whether a node shrinks everything to a point: programs without visibility hide parts in this way.
 fn has_no_size(scene_from_node: DMat4) -> bool {
-    [
-        scene_from_node.x_axis,
-        scene_from_node.y_axis,
-        scene_from_node.z_axis,
-    ]
-    .into_iter()
-    .all(|axis| axis.truncate().length_squared() == 0.0)
+    let DMat4 {
+        x_axis,
+        y_axis,
+        z_axis,
+        ..
+    } = scene_from_node;
+    [x_axis, y_axis, z_axis]
+        .iter()
+        .all(|axis| axis.truncate().length_squared() == 0.0)
 }
 
 /// Extensions that do not change the shape, and one that the reader knows; of families, what their names start with.
@@ -277,12 +276,13 @@ impl Extended {
 
     /// Whether a node is hidden, and what is below it.
     pub(super) fn hides(&self, node: usize) -> bool {
-        [
+        let members = [
             "/KHR_node_visibility/visible",
             "/MOZ_hubs_components/visible/visible",
-        ]
-        .iter()
-        .any(|visible| self.member(node, visible) == Some(&Value::Bool(false)))
+        ];
+        members
+            .iter()
+            .any(|member| self.member(node, member) == Some(&Value::Bool(false)))
     }
 
     /// Whether a node is a collider.
@@ -303,10 +303,10 @@ impl Extended {
     pub(super) fn is_transparent(&self, material: usize) -> bool {
         self.materials.get(material).is_some_and(|material| {
             let opacity = material.pbr_metallic_roughness.pointer("/baseColorFactor/3");
-            matches!(material.alpha_mode.as_str(), "BLEND" | "MASK")
-                && opacity
-                    .and_then(Value::as_f64)
-                    .is_some_and(|opacity| opacity <= 0.0)
+            let is_clear = opacity
+                .and_then(Value::as_f64)
+                .is_some_and(|opacity| opacity <= 0.0);
+            is_clear && matches!(material.alpha_mode.as_str(), "BLEND" | "MASK")
         })
     }
 }

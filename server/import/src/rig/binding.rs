@@ -22,33 +22,15 @@ use super::{
 /// Relative change of a translation that counts as one.
 const TRANSLATION_TOLERANCE: f64 = 1e-4;
 
-/// What a node moves with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Bone {
-    /// The wrist and the bones of the palm.
-    Wrist,
-    /// A link of a digit.
-    Link(usize, usize),
-}
-
-impl Bone {
-    /// The bone of a joint.
-    fn of_joint(joint: usize) -> Self {
-        let digit = (0..5)
-            .find(|&digit| (index::TIP_OF_DIGIT[digit] - 3..=index::TIP_OF_DIGIT[digit]).contains(&joint));
-        digit.map_or(Self::Wrist, |digit| {
-            let link = joint + 3 - index::TIP_OF_DIGIT[digit];
-            Self::Link(digit, link.min(2))
-        })
-    }
-
-    /// Its frame among those of a hand.
-    fn frame(self, frames: &HandFrames) -> Pose {
-        match self {
-            Self::Wrist => frames.wrist,
-            Self::Link(digit, link) => frames.digits[digit].links[link],
-        }
-    }
+/// The frame of the link that a joint moves with: the wrist's for the joints of the palm.
+fn link_frame(frames: &HandFrames, joint: usize) -> Pose {
+    let digit = index::TIP_OF_DIGIT
+        .iter()
+        .position(|&tip| (tip - 3..=tip).contains(&joint));
+    digit.map_or(frames.wrist, |digit| {
+        let link = joint + 3 - index::TIP_OF_DIGIT[digit];
+        frames.digits[digit].links[link.min(2)]
+    })
 }
 
 /// A node that is a joint of the hand.
@@ -56,8 +38,8 @@ impl Bone {
 struct BoundNode {
     name: String,
     joint: usize,
-    bone: Bone,
-    parent: Bone,
+    /// The joint that its parent moves with.
+    parent: usize,
     /// The bound hand's wrist in the frame of the node's parent.
     parent_from_wrist: DMat4,
     wrist_from_node: DMat4,
@@ -97,15 +79,8 @@ impl Binding {
         rig: &Rig,
         (scene_from_wrist, joints): (Pose, &[Vec3; JOINT_COUNT]),
     ) -> Self {
-        let scene_from_wrist = DMat4::from_rotation_translation(
-            scene_from_wrist.orientation.as_dquat(),
-            scene_from_wrist.position.as_dvec3(),
-        );
+        let scene_from_wrist = matrix(scene_from_wrist);
         let wrist_from_scene = scene_from_wrist.inverse();
-        let bone_of = |node: usize| {
-            hand.nearest_joint(model, node)
-                .map_or(Bone::Wrist, Bone::of_joint)
-        };
         let root = root(model, hand);
         let nodes = hand.joints.iter().enumerate().filter_map(|(joint, node)| {
             let node = (*node)?;
@@ -114,8 +89,7 @@ impl Binding {
             Some(BoundNode {
                 name: model.names[node].clone(),
                 joint,
-                bone: Bone::of_joint(joint),
-                parent: bone_of(parent),
+                parent: hand.nearest_joint(model, parent).unwrap_or(index::WRIST),
                 parent_from_wrist: bind.scene_from_node(parent).inverse() * scene_from_wrist,
                 wrist_from_node: wrist_from_scene * bind.scene_from_node(node),
                 translation: rest.w_axis.truncate(),
@@ -148,22 +122,18 @@ impl Binding {
 
     /// The root's frame in that of the pose. `scale` is how much larger the posed rig is than the one of the model.
     pub fn frame_from_root(&self, frames: &HandFrames, scale: f32) -> Pose {
-        let Pose {
-            position,
-            orientation,
-        } = self.wrist_from_root;
-        frames.wrist * Pose::new(scale * position, orientation)
+        let wrist_from_root = self.wrist_from_root;
+        frames.wrist * Pose::new(scale * wrist_from_root.position, wrist_from_root.orientation)
     }
 
     /// The nodes of a posed rig, which is `scale` times as large as the one of the model.
     pub fn posed(&self, frames: &HandFrames, scale: f32) -> impl Iterator<Item = PosedNode<'_>> {
         self.nodes.iter().map(move |node| {
-            let bound = |bone: Bone| bone.frame(&self.bound);
-            let mut moved = node.parent.frame(frames).inverse() * node.bone.frame(frames);
+            let [parent, own] = [node.parent, node.joint].map(|joint| link_frame(frames, joint));
+            let [bound_parent, bound] = [node.parent, node.joint].map(|joint| link_frame(&self.bound, joint));
+            let mut moved = parent.inverse() * own;
             moved.position /= scale;
-            let moved = bound(node.parent) * moved * bound(node.bone).inverse();
-            let moved =
-                DMat4::from_rotation_translation(moved.orientation.as_dquat(), moved.position.as_dvec3());
+            let moved = matrix(bound_parent * moved * bound.inverse());
             let parent_from_node = node.parent_from_wrist * moved * node.wrist_from_node;
             let (_, rotation, translation): (_, DQuat, _) = parent_from_node.to_scale_rotation_translation();
             let change = translation.distance(node.translation);
@@ -175,6 +145,10 @@ impl Binding {
             }
         })
     }
+}
+
+fn matrix(pose: Pose) -> DMat4 {
+    DMat4::from_rotation_translation(pose.orientation.as_dquat(), pose.position.as_dvec3())
 }
 
 /// The lowest node that is or is above every joint of the hand.

@@ -8,18 +8,17 @@ use grasp_synthesis::model::hand::{
 
 use super::{
     RigSource,
-    hand_nodes::{DIGIT_NAMES, hand_name},
+    hand_nodes::{digit_name, hand_name, joint_name},
     radii::{SkinVertex, Widths, median},
     rest::{Skeleton, base_of},
 };
 use crate::error::Violations;
 
-/// Distances of the knuckles from the wrist relative to the bones that follow them, as a mean: hands have 1.9 to 2.6, and those of
-/// cartoons at least 1.2. Below the first, the knuckles are joints in the palm; beyond the second and third, they may be others.
+/// Mean distances of the knuckles from the wrist relative to the bones after them (hands have 1.9 to 2.6, those of cartoons at
+/// least 1.2): below the first, they are joints in the palm; beyond the second and third, they may be others.
 const KNUCKLES: [f32; 3] = [0.6, 0.9, 4.0];
 
-/// Sums of the bends of a finger in the bind pose, in radians: from the first on, widths are less certain, and from the second on,
-/// a fist is seen whose skin does not show them.
+/// Sums of a finger's bends in the bind pose, in radians, from which widths are less certain, and from which they are not shown.
 const BENDS: [f32; 2] = [1.4, 2.6];
 
 /// Fewest vertices around a bone that tell where its skin is.
@@ -55,10 +54,6 @@ impl HandCheck<'_> {
         (violations.len() == before).then_some(())
     }
 
-    fn name(&self) -> &'static str {
-        hand_name(self.side)
-    }
-
     fn digits(&self) -> impl Iterator<Item = usize> {
         (0..5).filter(|&digit| self.skeleton.has[digit])
     }
@@ -80,28 +75,21 @@ impl HandCheck<'_> {
         let Some(first) = knuckles.first().copied() else {
             return;
         };
+        let [from_wrist, length] = [self.joint(first), self.bone(first)].map(|way| millimetres(way.length()));
         let described = format!(
-            "is {} from the wrist and {} from {}",
-            millimetres(self.joint(first).length()),
-            millimetres(self.bone(first).length()),
-            JOINT_NAMES[first + 1],
+            "is {from_wrist} from the wrist and {length} from {}",
+            JOINT_NAMES[first + 1]
         );
-        let place = format!("{}, {}", self.name(), JOINT_NAMES[first]);
+        let place = joint_name(self.side, first);
         let [refused, warned, far] = KNUCKLES;
         if mean < refused {
-            violations.add(
-                place,
-                format!(
-                    "{described}, and the other fingers are alike: these are bones in the palm, which do not bend; say which nodes \
-                     the joints are in joint_map"
-                ),
+            let what = format!(
+                "{described}, and the other fingers are alike: these are bones in the palm, which do not bend; say which nodes the \
+                 joints are in joint_map"
             );
+            violations.add(place, what);
         } else if mean < warned || mean > far {
-            let other = if mean > far {
-                "the second ones"
-            } else {
-                "in the palm"
-            };
+            let other = ["in the palm", "the second ones"][usize::from(mean > far)];
             warnings.push(format!(
                 "{place}: {described}, and the other fingers are alike; if these bones are {other}, say which nodes the joints are in \
                  joint_map"
@@ -114,23 +102,19 @@ impl HandCheck<'_> {
         for digit in self.digits() {
             let base = base_of(digit);
             let links = [0, 1, 2].map(|link| self.bone(base + link).normalize_or(Vec3::Y));
-            let at_knuckle = if digit == 0 {
-                0.0
-            } else {
-                links[0].z.atan2(links[0].y).abs()
-            };
-            let bend = at_knuckle + links[0].angle_between(links[1]) + links[1].angle_between(links[2]);
-            let place = format!("{}, {}", self.name(), DIGIT_NAMES[digit]);
-            let degrees = bend.to_degrees();
+            // The thumb's first joint is not at the palm.
+            let first = if digit == 0 { Vec3::Y } else { links[0] };
+            let bend = first.z.atan2(first.y).abs()
+                + links[0].angle_between(links[1])
+                + links[1].angle_between(links[2]);
+            let place = digit_name(self.side, digit);
+            let [degrees, most] = [bend, BENDS[1]].map(f32::to_degrees);
             if bend > BENDS[1] && !self.skin.is_empty() {
-                violations.add(
-                    place,
-                    format!(
-                        "is bent by {degrees:.0}° where the skin is bound, at most {:.0}° can be measured; bind the skin with the \
-                         hand open",
-                        BENDS[1].to_degrees()
-                    ),
+                let what = format!(
+                    "is bent by {degrees:.0}° where the skin is bound, at most {most:.0}° can be measured; bind the skin with the \
+                     hand open"
                 );
+                violations.add(place, what);
             } else if bend > BENDS[0] {
                 warnings.push(format!(
                     "{place}: is bent by {degrees:.0}° where the skin is bound, so its widths are less certain"
@@ -145,9 +129,8 @@ impl HandCheck<'_> {
         let of_digit = |vertex: &&SkinVertex| (base..=base + 3).contains(&vertex.joint);
         if !self.skin.is_empty() && self.skin.iter().filter(of_digit).count() < FEWEST {
             warnings.push(format!(
-                "{}, {}: has bones, but they move no skin; what it touches will look untouched",
-                self.name(),
-                DIGIT_NAMES[digit]
+                "{}: has bones, but they move no skin; what it touches will look untouched",
+                digit_name(self.side, digit)
             ));
             return;
         }
@@ -157,35 +140,27 @@ impl HandCheck<'_> {
             let (start, bone) = (self.joint(joint), self.bone(joint));
             let (length, axis) = (bone.length(), bone.normalize_or(Vec3::Y));
             let own = self.skin.iter().filter(|vertex| vertex.joint == joint);
-            let around: Vec<Vec3> = own
-                .clone()
-                .map(|vertex| vertex.position - start)
-                .filter(|offset| (0.0..length).contains(&offset.dot(axis)))
-                .map(|offset| offset.reject_from_normalized(axis))
-                .collect();
-            let place = format!("{}, {}", self.name(), JOINT_NAMES[joint]);
+            let offsets = own.clone().map(|vertex| vertex.position - start);
+            let beside = offsets.filter(|offset| (0.0..length).contains(&offset.dot(axis)));
+            let around: Vec<Vec3> = beside.map(|offset| offset.reject_from_normalized(axis)).collect();
+            let place = joint_name(self.side, joint);
             let count = own.clone().count();
             // Most of the skin of an outer link is beside it.
             if link > 0 && count >= FEWEST && 4 * around.len() < count {
                 let middle = own.map(|vertex| vertex.position).sum::<Vec3>() / count as f32;
-                violations.add(
-                    place,
-                    format!(
-                        "is {} from the middle of the skin that it moves, nearly all of which is beyond the bone; a bone must lie in its \
-                         skin, where the skin is bound",
-                        millimetres(middle.distance(start))
-                    ),
+                let what = format!(
+                    "is {} from the middle of the skin that it moves, nearly all of which is beyond the bone; a bone must lie in its \
+                     skin, where the skin is bound",
+                    millimetres(middle.distance(start))
                 );
+                violations.add(place, what);
                 continue;
             }
             if around.len() < FEWEST {
                 continue;
             }
-            let (low, high) = around
-                .iter()
-                .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &offset| {
-                    (low.min(offset), high.max(offset))
-                });
+            let low = around.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+            let high = around.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
             let middle = low.midpoint(high);
             let radii = around.iter().map(|offset| offset.distance(middle));
             let radius = median(radii.collect(), 1).unwrap_or(0.0);
@@ -195,10 +170,8 @@ impl HandCheck<'_> {
                 millimetres(2.0 * radius)
             );
             if middle.length() > ELSEWHERE * radius {
-                violations.add(
-                    place,
-                    format!("{described}; a bone must lie in its skin, where the skin is bound"),
-                );
+                let what = format!("{described}; a bone must lie in its skin, where the skin is bound");
+                violations.add(place, what);
             } else if middle.length() > OUTSIDE * radius {
                 warnings.push(format!("{place}: {described}, so contacts will look as far off"));
             }
@@ -207,35 +180,31 @@ impl HandCheck<'_> {
 
     /// Warns of what the model does not show.
     fn tell_what_is_taken(&self, warnings: &mut Vec<String>) {
-        let (name, reference) = (self.name(), &self.source.reference.name);
+        let (name, reference) = (hand_name(self.side), &self.source.reference.name);
         if self.skin.is_empty() {
             warnings.push(format!(
                 "{name}: has no skin, so its widths are those of the rig {reference} at its size"
             ));
         }
-        let named = |joints: Vec<usize>| {
-            joints
-                .into_iter()
-                .map(|joint| JOINT_NAMES[joint])
-                .collect::<Vec<_>>()
+        let named = |joints: &mut dyn Iterator<Item = usize>| {
+            let names: Vec<&str> = joints.map(|joint| JOINT_NAMES[joint]).collect();
+            names.join(", ")
         };
         let metacarpals = self.digits().filter(|&digit| digit > 0);
         let metacarpals = metacarpals.map(|digit| index::FIRST_OF_DIGIT[digit]);
-        let absent = named(metacarpals.filter(|&joint| !self.has[joint]).collect());
+        let absent = named(&mut metacarpals.filter(|&joint| !self.has[joint]));
         if !absent.is_empty() {
             warnings.push(format!(
-                "{name}: has no {}; placed as in the rig {reference}",
-                absent.join(", ")
+                "{name}: has no {absent}; placed as in the rig {reference}"
             ));
         }
         let tips = self.digits().map(|digit| (digit, index::TIP_OF_DIGIT[digit]));
         let endless = tips.filter(|&(digit, tip)| !self.has[tip] && self.widths.tips[digit].is_none());
-        let endless = named(endless.map(|(_, tip)| tip).collect());
+        let endless = named(&mut endless.map(|(_, tip)| tip));
         if !endless.is_empty() {
             warnings.push(format!(
-                "{name}: has no {}, and no skin that ends there; the last links are as long as those of the rig {reference}, for the \
-                 links before them",
-                endless.join(", ")
+                "{name}: has no {endless}, and no skin that ends there; the last links are as long as those of the rig {reference}, \
+                 for the links before them"
             ));
         }
         let of_digits = self.digits().flat_map(|digit| {
@@ -244,12 +213,11 @@ impl HandCheck<'_> {
         });
         let of_hand = of_digits.chain([index::PALM, index::WRIST]);
         let unknown = |joint: &usize| !self.widths.is_shown[*joint] && self.source.radii[*joint].is_none();
-        let unknown = named(of_hand.filter(unknown).collect());
+        let unknown = named(&mut of_hand.filter(unknown));
         if !unknown.is_empty() && !self.skin.is_empty() {
             warnings.push(format!(
-                "{name}: the skin does not show the width at {}; it is that of the rig {reference}, as much wider as the rest of the \
-                 digit or hand",
-                unknown.join(", ")
+                "{name}: the skin does not show the width at {unknown}; it is that of the rig {reference}, as much wider as the rest \
+                 of the digit or hand"
             ));
         }
     }

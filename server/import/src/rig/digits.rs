@@ -12,7 +12,7 @@ use grasp_synthesis::model::hand::{
 };
 
 use super::{
-    hand_nodes::{DIGIT_NAMES, is_required, joints_of, shortened},
+    hand_nodes::{HandNodes, digit_name, is_required, joints_of, shortened},
     model::Model,
     names::Segment,
 };
@@ -42,25 +42,7 @@ pub(super) struct NamedDigits([Vec<(usize, Segment)>; 5]);
 #[derive(Debug)]
 pub(super) struct UnclearFinger {
     pub(super) digit: usize,
-    bones: Vec<usize>,
-}
-
-impl UnclearFinger {
-    /// The violation, for a hand with a name.
-    pub(super) fn violation(&self, model: &Model, name: &str) -> ImportError {
-        let names = self
-            .bones
-            .iter()
-            .map(|&node| format!("{:?}", shortened(&model.names[node])));
-        ImportError::at(
-            format!("{name}, {}", DIGIT_NAMES[self.digit]),
-            format!(
-                "has four bones, {}, and neither their places nor the skin tell whether the first is in the palm or the last is the \
-                 tip; say which joints they are in joint_map",
-                names.collect::<Vec<_>>().join(", ")
-            ),
-        )
-    }
+    pub(super) violation: ImportError,
 }
 
 /// The numbered bones of a digit in their order, and others that names tell.
@@ -85,38 +67,42 @@ impl NamedDigits {
         self.0.iter().flatten().map(|&(node, _)| node)
     }
 
-    /// Adds the joints of digits that lack some, unless others of the digit are other nodes than names say. Gives the fingers of
-    /// which it is not clear which joints they are.
+    /// Adds the joints of digits that lack some, unless others are other nodes than names say. Gives the fingers that are unclear.
     pub(super) fn complete(
         &self,
         model: &Model,
-        wrist: Option<usize>,
-        joints: &mut [Option<usize>; JOINT_COUNT],
+        HandNodes { side, joints }: &mut HandNodes,
     ) -> Vec<UnclearFinger> {
+        let wrist = joints[index::WRIST];
         let lacks =
             |digit: usize| joints_of(digit).any(|joint| is_required(joint) && joints[joint].is_none());
         let lacking = [0, 1, 2, 3, 4].map(lacks);
-        let numbered: Vec<(usize, Numbered)> = (0..5)
-            .filter(|&digit| lacking[digit] && !self.is_in_words(digit))
-            .map(|digit| (digit, self.numbered(model, digit)))
-            .collect();
+        let mut numbered: Vec<(usize, Numbered)> = Vec::new();
         let mut named = [None; JOINT_COUNT];
-        for digit in (0..5).filter(|&digit| lacking[digit] && self.is_in_words(digit)) {
-            self.by_words(digit, &mut named);
+        for digit in (0..5).filter(|&digit| lacking[digit]) {
+            if self.is_in_words(digit) {
+                self.by_words(digit, &mut named);
+            } else {
+                numbered.push((digit, self.numbered(model, digit)));
+            }
         }
-        let fingers = || {
-            let fingers = numbered.iter().filter(|(digit, _)| *digit > 0);
-            fingers.map(|(_, bones)| bones)
-        };
-        let starts_in_palm = starts_in_palm(model, wrist, fingers());
+        let fingers = numbered.iter().filter(|(digit, _)| *digit > 0);
+        let starts_in_palm = starts_in_palm(model, wrist, fingers.map(|(_, bones)| bones));
         let mut unclear = Vec::new();
         for (digit, numbered) in &numbered {
             let bones = if *digit == 0 {
                 numbered.of_thumb(model)
             } else if numbered.is_unclear() && starts_in_palm.is_none() {
+                let bones = numbered.bones.iter().flatten();
+                let names = bones.map(|&node| format!("{:?}", shortened(&model.names[node])));
+                let what = format!(
+                    "has four bones, {}, and neither their places nor the skin tell whether the first is in the palm or the last is \
+                     the tip; say which joints they are in joint_map",
+                    names.collect::<Vec<_>>().join(", ")
+                );
                 unclear.push(UnclearFinger {
                     digit: *digit,
-                    bones: numbered.bones.iter().flatten().copied().collect(),
+                    violation: ImportError::at(digit_name(*side, *digit), what),
                 });
                 continue;
             } else {
@@ -163,22 +149,17 @@ impl NamedDigits {
         let node = |segment| self.with(digit, segment).next();
         // A thumb with the names of a finger is as in Unity's humanoid.
         let is_finger = node(Segment::Metacarpal).is_none() && node(Segment::Intermediate).is_some();
-        let places = if digit > 0 || is_finger {
-            [
-                (Segment::Metacarpal, first),
-                (Segment::Proximal, tip - 3),
-                (Segment::Intermediate, tip - 2),
-                (Segment::Distal, tip - 1),
-            ]
+        let [metacarpal, proximal] = if digit > 0 || is_finger {
+            [first, tip - 3]
         } else {
-            [
-                (Segment::Metacarpal, tip - 3),
-                (Segment::Intermediate, tip - 2),
-                (Segment::Proximal, tip - 2),
-                (Segment::Distal, tip - 1),
-            ]
+            [tip - 3, tip - 2]
         };
-        for (segment, joint) in places {
+        for (segment, joint) in [
+            (Segment::Metacarpal, metacarpal),
+            (Segment::Intermediate, tip - 2),
+            (Segment::Proximal, proximal),
+            (Segment::Distal, tip - 1),
+        ] {
             joints[joint] = node(segment).or(joints[joint]);
         }
     }
@@ -251,12 +232,8 @@ impl Numbered {
             _ => true,
         };
         let mut bones = self.bones.iter().copied();
-        let metacarpal = if starts_in_palm {
-            bones.next().flatten()
-        } else {
-            self.metacarpal
-        };
         let mut next = || bones.next().flatten();
+        let metacarpal = if starts_in_palm { next() } else { self.metacarpal };
         [metacarpal, next(), next(), next(), next()]
     }
 
@@ -284,10 +261,10 @@ fn starts_in_palm<'a>(
     fingers: impl Iterator<Item = &'a Numbered>,
 ) -> Option<bool> {
     let fingers: Vec<&Numbered> = fingers.filter(|finger| finger.is_unclear()).collect();
-    let distances: Vec<f64> = fingers
+    let distances = fingers
         .iter()
-        .filter_map(|finger| from_wrist(model, wrist?, &finger.bones))
-        .collect();
+        .filter_map(|finger| from_wrist(model, wrist?, &finger.bones));
+    let distances: Vec<f64> = distances.collect();
     let mean = distances.iter().sum::<f64>() / distances.len() as f64;
     if mean < IN_PALM[0] {
         return Some(true);

@@ -12,8 +12,7 @@ const FEWEST: usize = 12;
 
 /// How the vertices of a skin count.
 struct PadVertices {
-    /// Cosines to the pad's direction at which they start to count, and from which they count fully: the sides touch less often,
-    /// the nail hardly ever.
+    /// Cosines to the pad's direction at which they start to count, and from which they count fully.
     cosines: [f32; 2],
     /// Most vertices that are compared.
     most: usize,
@@ -39,13 +38,12 @@ impl PadVertices {
         let every = vertices.len().div_ceil(self.most).max(1);
         let [least, most] = self.cosines;
         let sample = vertices.iter().step_by(every);
-        sample
-            .filter_map(|&vertex| {
-                let (across, pad) = across(vertex)?;
-                let weight = ((across.dot(pad) - least) / (most - least)).clamp(0.0, 1.0);
-                (weight > 0.0).then_some((vertex, weight))
-            })
-            .collect()
+        let weighted = sample.filter_map(|&vertex| {
+            let (across, pad) = across(vertex)?;
+            let weight = ((across.dot(pad) - least) / (most - least)).clamp(0.0, 1.0);
+            (weight > 0.0).then_some((vertex, weight))
+        });
+        weighted.collect()
     }
 
     /// The sum of the squared distances of vertices from the surface of solids.
@@ -59,12 +57,10 @@ impl PadVertices {
     }
 }
 
-/// Shares of the first link's length before which the skin is that of the palm, and of the last link's beyond which it is that of
-/// the tip.
+/// Shares of the first link before which the skin is the palm's, and of the last link beyond which it is the tip's.
 const ENDS: [f32; 2] = [0.3, 0.85];
 
-/// Share of its distance from the bones that the skin is on the pads' side of them, from which bones lie near the back: those of
-/// the built-in hands have 0.1, and those of hands that this is for 0.3 to 0.6.
+/// Share of its distance from the bones that the skin is on the pads' side: the built-in hands have 0.1, others 0.3 to 0.6.
 const NEAR_BACK: f32 = 0.2;
 
 /// Smallest and largest radius as a multiple of the measured one.
@@ -75,6 +71,37 @@ const STEPS: [f32; 5] = [0.2, 0.1, 0.05, 0.025, 0.0125];
 
 /// Rounds over all radii at each step.
 const ROUNDS: usize = 6;
+
+/// Values that are being fitted, with their ranges and the error that is left.
+struct Fit {
+    values: [f32; 3],
+    ranges: [[f32; 2]; 3],
+    least: f32,
+}
+
+impl Fit {
+    /// Changes each value by turns, up and down by a step, if that lessens the error; false if nothing did.
+    fn improve(
+        &mut self,
+        step: f32,
+        changed: impl Fn(usize, &Self, f32) -> f32,
+        error: impl Fn([f32; 3]) -> f32,
+    ) -> bool {
+        let before = self.least;
+        for place in 0..3 {
+            for step in [step, -step] {
+                let [min, max] = self.ranges[place];
+                let mut tried = self.values;
+                tried[place] = changed(place, self, step).clamp(min, max);
+                let tried_error = error(tried);
+                if tried_error < self.least {
+                    (self.values, self.least) = (tried, tried_error);
+                }
+            }
+        }
+        self.least < before
+    }
+}
 
 /// The links of a digit: the joints and the tip, the radii there, and the directions that the links' pads face, across the bones.
 #[derive(Clone, Copy, Debug)]
@@ -99,34 +126,25 @@ impl Links {
             Some((across.normalize_or_zero(), self.pads[link]))
         });
         let [first, second, third, tip] = self.radii;
-        let mut radii = [first, second, third];
         if weighted.len() < FEWEST || self.toward_pads(vertices) < NEAR_BACK {
-            return radii;
+            return [first, second, third];
         }
         let error = |[first, second, third]: [f32; 3]| {
             OF_LINKS.error(&weighted, &link_solids(self.points, [first, second, third, tip]))
         };
-        let mut least = error(radii);
+        let mut fit = Fit {
+            values: [first, second, third],
+            ranges: [first, second, third].map(|radius| RADII.map(|share| share * radius)),
+            least: error([first, second, third]),
+        };
         for step in STEPS {
             for _ in 0..ROUNDS {
-                let before = least;
-                for place in 0..3 {
-                    for factor in [1.0 + step, 1.0 - step] {
-                        let [min, max] = RADII.map(|share| share * self.radii[place]);
-                        let mut tried = radii;
-                        tried[place] = (radii[place] * factor).clamp(min, max);
-                        let tried_error = error(tried);
-                        if tried_error < least {
-                            (radii, least) = (tried, tried_error);
-                        }
-                    }
-                }
-                if least >= before {
+                if !fit.improve(step, |place, fit, step| fit.values[place] * (1.0 + step), error) {
                     break;
                 }
             }
         }
-        radii
+        fit.values
     }
 
     /// How far the skin of the two outer links is on the pads' side of the bones, as a share of its distance from them.
@@ -158,8 +176,7 @@ impl Links {
     }
 }
 
-/// How a last link is fitted, with the ranges: its slopes toward the pad and to the side, and the radius of the tip as a multiple of
-/// the measured one.
+/// Ranges of a last link's slopes toward the pad and to the side, and of the tip's radius as a multiple of the measured one.
 const TIP_RANGES: [[f32; 2]; 3] = [[-0.3, 0.3], [-0.15, 0.15], [0.6, 1.4]];
 
 /// Share of the link's length from which vertices count: nearer to the joint, the skin is also that of the link before.
@@ -209,28 +226,22 @@ impl LastLink {
             }
         };
         let error = |fit: [f32; 3]| OF_TIP.error(&weighted, &[self.solid(tip(fit))]);
-        // By turns along each parameter, in ever smaller steps.
-        let mut fit = [0.0, 0.0, 1.0];
-        let mut least = error(fit);
+        let mut fit = Fit {
+            values: [0.0, 0.0, 1.0],
+            ranges: TIP_RANGES,
+            least: error([0.0, 0.0, 1.0]),
+        };
         let mut step = 0.5;
         while step > 0.01 {
-            let before = least;
-            for parameter in 0..TIP_RANGES.len() {
-                let [min, max] = TIP_RANGES[parameter];
-                for change in [step, -step] {
-                    let mut tried = fit;
-                    tried[parameter] = (fit[parameter] + 0.5 * change * (max - min)).clamp(min, max);
-                    let tried_error = error(tried);
-                    if tried_error < least {
-                        (fit, least) = (tried, tried_error);
-                    }
-                }
-            }
-            if least >= before {
+            let changed = |place: usize, fit: &Fit, step: f32| {
+                let [min, max] = fit.ranges[place];
+                fit.values[place] + 0.5 * step * (max - min)
+            };
+            if !fit.improve(step, changed, error) {
                 step *= 0.5;
             }
         }
-        tip(fit)
+        tip(fit.values)
     }
 
     /// The solid of the link, whose last sphere ends at the tip.

@@ -11,7 +11,7 @@ use super::{
     MappedJoint, RigSource,
     digits::{NamedDigits, UnclearFinger},
     model::Model,
-    names::{self, NodeName, Part, VrmJoint},
+    names::{self, NodeName},
 };
 use crate::error::Violations;
 
@@ -24,6 +24,14 @@ pub(super) struct HandNodes {
 }
 
 impl HandNodes {
+    /// A left and a right hand without nodes.
+    pub(super) const NONE: [Self; 2] = [Self::of(Handedness::Left), Self::of(Handedness::Right)];
+
+    const fn of(side: Handedness) -> Self {
+        let joints = [None; JOINT_COUNT];
+        Self { side, joints }
+    }
+
     /// The joint that a node is.
     pub(super) fn joint_of(&self, node: usize) -> Option<usize> {
         self.joints.iter().position(|&other| other == Some(node))
@@ -42,7 +50,7 @@ pub(super) fn is_required(joint: usize) -> bool {
 }
 
 /// Names of the digits, thumb first.
-pub(super) const DIGIT_NAMES: [&str; 5] = [
+const DIGIT_NAMES: [&str; 5] = [
     "thumb",
     "index finger",
     "middle finger",
@@ -60,10 +68,9 @@ pub(super) fn joints_of(digit: usize) -> std::ops::RangeInclusive<usize> {
 
 /// Adds a violation if a hand with these digits, thumb first, can hold nothing.
 pub(super) fn check_digits(side: Handedness, has: [bool; 5], violations: &mut Violations) {
-    let name = hand_name(side);
     if !has[0] {
         violations.add(
-            format!("{name}, thumb"),
+            digit_name(side, 0),
             "is missing; without a thumb, nothing opposes the fingers and no grasp holds. If it is there under other names, \
              give them in joint_map",
         );
@@ -71,13 +78,11 @@ pub(super) fn check_digits(side: Handedness, has: [bool; 5], violations: &mut Vi
     let missing = missing_fingers(has);
     if missing.len() > 4 - FEWEST_FINGERS {
         let missing = missing.join(", ");
-        violations.add(
-            name,
-            format!(
-                "lacks the {missing}; a hand must have a thumb and at least {FEWEST_FINGERS} fingers, because objects turn between \
-                 two digits. If they are there under other names, give them in joint_map"
-            ),
+        let what = format!(
+            "lacks the {missing}; a hand must have a thumb and at least {FEWEST_FINGERS} fingers, because objects turn between two \
+             digits. If they are there under other names, give them in joint_map"
         );
+        violations.add(hand_name(side), what);
     }
 }
 
@@ -87,7 +92,7 @@ fn missing_fingers(has: [bool; 5]) -> Vec<&'static str> {
     missing.map(|digit| DIGIT_NAMES[digit]).collect()
 }
 
-/// "left hand" or "right hand".
+/// A hand in words, for messages.
 pub(super) fn hand_name(side: Handedness) -> &'static str {
     match side {
         Handedness::Left => "left hand",
@@ -95,38 +100,40 @@ pub(super) fn hand_name(side: Handedness) -> &'static str {
     }
 }
 
+/// A digit of a hand in words.
+pub(super) fn digit_name(side: Handedness, digit: usize) -> String {
+    format!("{}, {}", hand_name(side), DIGIT_NAMES[digit])
+}
+
+/// A joint of a hand in words.
+pub(super) fn joint_name(side: Handedness, joint: usize) -> String {
+    format!("{}, {}", hand_name(side), JOINT_NAMES[joint])
+}
+
 /// The hands of a model: by the map, by the extension of VRM if there is one, and where that names none of a digit's bones by
 /// names. Adds a violation for every required joint that is missing.
 pub(super) fn hand_nodes(
     model: &Model,
-    vrm: Option<&[VrmJoint]>,
+    vrm: Option<[HandNodes; 2]>,
     source: &RigSource<'_>,
     violations: &mut Violations,
 ) -> Vec<HandNodes> {
     let side = source.side;
-    let mut hands = [Handedness::Left, Handedness::Right].map(|side| HandNodes {
-        side,
-        joints: [None; JOINT_COUNT],
-    });
-    for joint in vrm.unwrap_or_default() {
-        if joint.node < model.names.len() {
-            hand_mut(&mut hands, joint.side).joints[joint.joint] = Some(joint.node);
-        }
-    }
+    let has_vrm = vrm.is_some();
+    let mut hands = vrm.unwrap_or(HandNodes::NONE);
     let unclear = by_names(model, side, &mut hands);
-    let is_of_other_file =
-        |mapped: &MappedJoint| source.is_of_pair && mapped.side.is_some() && mapped.side != side;
     for (place, mapped) in source.joint_map.iter().enumerate() {
-        if is_of_other_file(mapped) {
-            continue;
+        let is_of_other_file = source.is_of_pair && mapped.side.is_some() && mapped.side != side;
+        if !is_of_other_file {
+            apply(model, mapped, place, side, &mut hands, violations);
         }
-        apply(model, mapped, place, side, &mut hands, violations);
     }
-    for (side, finger) in &unclear {
-        let hand = hand_mut(&mut hands, *side);
-        let mut joints = joints_of(finger.digit).filter(|&joint| is_required(joint));
-        if joints.any(|joint| hand.joints[joint].is_none()) {
-            violations.push(finger.violation(model, hand_name(*side)));
+    for (hand, unclear) in hands.iter().zip(unclear) {
+        for UnclearFinger { digit, violation } in unclear {
+            let mut joints = joints_of(digit).filter(|&joint| is_required(joint));
+            if joints.any(|joint| hand.joints[joint].is_none()) {
+                violations.push(violation);
+            }
         }
     }
     if violations.len() > 0 {
@@ -144,10 +151,7 @@ pub(super) fn hand_nodes(
     };
     let found: Vec<HandNodes> = hands.into_iter().filter(has_digits).collect();
     if found.is_empty() {
-        let extension = match vrm {
-            Some(_) => "names no fingers in its VRM extension, and ",
-            None => "",
-        };
+        let extension = ["", "names no fingers in its VRM extension, and "][usize::from(has_vrm)];
         violations.add(
             "the model",
             format!(
@@ -162,43 +166,23 @@ pub(super) fn hand_nodes(
     found
 }
 
-fn hand_mut(hands: &mut [HandNodes; 2], side: Handedness) -> &mut HandNodes {
-    match side {
-        Handedness::Left => &mut hands[0],
-        Handedness::Right => &mut hands[1],
-    }
-}
-
 /// Adds the nodes with the names of joints, of digits that have none. Of several for a joint, those that move a skin come first,
-/// then the shallowest. Gives the fingers of which names do not tell the joints.
-fn by_names(
-    model: &Model,
-    side: Option<Handedness>,
-    hands: &mut [HandNodes; 2],
-) -> Vec<(Handedness, UnclearFinger)> {
-    let mut read: Vec<(usize, NodeName)> = model
-        .names
-        .iter()
-        .enumerate()
-        .filter_map(|(node, name)| Some((node, names::read(name)?)))
-        .collect();
-    let is_sided =
-        |(_, name): &(usize, NodeName)| name.side.is_some() && matches!(name.part, Part::Segment(..));
-    let has_sides = read.iter().any(is_sided);
-    for (_, name) in &mut read {
-        if !has_sides {
-            name.side = side;
-        }
-    }
+/// then the shallowest. Gives the fingers of each hand of which names do not tell the joints.
+fn by_names(model: &Model, side: Option<Handedness>, hands: &mut [HandNodes; 2]) -> [Vec<UnclearFinger>; 2] {
+    let named = model.names.iter().enumerate();
+    let read = named.filter_map(|(node, name)| Some((node, names::read(name)?)));
+    let mut read: Vec<(usize, NodeName)> = read.collect();
+    let is_sided = |name: NodeName| name.side.is_some() && name.segment.is_some();
+    let has_sides = read.iter().any(|&(_, name)| is_sided(name));
     read.sort_by_cached_key(|&(node, _)| (!model.is_bound(node), model.depth(node), node));
-    let mut unclear = Vec::new();
-    for hand in hands {
-        let own = read.iter().filter(|(_, name)| name.side == Some(hand.side));
+    hands.each_mut().map(|hand| {
         let (mut digits, mut wrists) = (NamedDigits::default(), Vec::new());
-        for &(node, name) in own {
-            match name.part {
-                Part::Wrist => wrists.push(node),
-                Part::Segment(digit, segment) => digits.push(digit, segment, node),
+        for &(node, name) in &read {
+            if (if has_sides { name.side } else { side }) == Some(hand.side) {
+                match name.segment {
+                    None => wrists.push(node),
+                    Some((digit, segment)) => digits.push(digit, segment, node),
+                }
             }
         }
         let above = ancestors_of_all(model, digits.nodes());
@@ -206,12 +190,9 @@ fn by_names(
         let named = wrists
             .into_iter()
             .max_by_key(|node| (above.contains(node), model.is_bound(*node), model.depth(*node)));
-        let wrist = hand.joints[index::WRIST].or(named);
-        let its_unclear = digits.complete(model, wrist, &mut hand.joints);
-        unclear.extend(its_unclear.into_iter().map(|finger| (hand.side, finger)));
-        hand.joints[index::WRIST] = wrist;
-    }
-    unclear
+        hand.joints[index::WRIST] = hand.joints[index::WRIST].or(named);
+        digits.complete(model, hand)
+    })
 }
 
 /// Nodes above all of some others.
@@ -237,11 +218,8 @@ fn apply(
     let named_side = names::read(&mapped.node).and_then(|name| name.side);
     let side = mapped.side.or(side).or(named_side);
     if joint.is_none() {
-        let what = format!(
-            "maps to {:?}, which is no joint; the joints are {}",
-            shortened(&mapped.joint),
-            JOINT_NAMES[1..].join(", ")
-        );
+        let (joint, joints) = (shortened(&mapped.joint), JOINT_NAMES[1..].join(", "));
+        let what = format!("maps to {joint:?}, which is no joint; the joints are {joints}");
         violations.add(place.as_str(), what);
     }
     if node.is_none() {
@@ -253,7 +231,7 @@ fn apply(
         violations.add(place, what);
     }
     if let (Some(joint), Some(node), Some(side)) = (joint, node, side) {
-        hand_mut(hands, side).joints[joint] = Some(node);
+        hands[side as usize].joints[joint] = Some(node);
     }
 }
 
@@ -264,15 +242,14 @@ pub(super) fn shortened(text: &str) -> String {
 
 /// Adds a violation for every required joint that is missing, and for nodes that are two joints or not below one another.
 fn check(model: &Model, hand: &HandNodes, violations: &mut Violations) {
-    let name = hand_name(hand.side);
-    let has: [bool; 5] =
-        std::array::from_fn(|digit| hand.joints[joints_of(digit)].iter().any(Option::is_some));
+    let name = |joint| joint_name(hand.side, joint);
+    let has = [0, 1, 2, 3, 4].map(|digit| hand.joints[joints_of(digit)].iter().any(Option::is_some));
     check_digits(hand.side, has, violations);
     for (joint, node) in hand.joints.iter().enumerate() {
         let is_of_missing = (0..5).any(|digit| !has[digit] && joints_of(digit).contains(&joint));
         if node.is_none() && is_required(joint) && !is_of_missing {
             violations.add(
-                format!("{name}, {}", JOINT_NAMES[joint]),
+                name(joint),
                 "is missing: no node has its name, although others of the hand or the digit are there. Fingers may be missing \
                  as a whole; if it is there under another name, give that in joint_map",
             );
@@ -281,28 +258,21 @@ fn check(model: &Model, hand: &HandNodes, violations: &mut Violations) {
     check_unknown_fingers(model, hand, has, violations);
     for (place, node) in hand.joints.iter().enumerate() {
         let Some(node) = *node else { continue };
-        let joint = JOINT_NAMES[place];
         if let Some(other) = hand.joints[..place].iter().position(|&other| other == Some(node)) {
-            violations.add(
-                format!("{name}, {joint}"),
-                format!(
-                    "is the node {:?}, which is {}, too; each joint needs a node of its own",
-                    shortened(&model.names[node]),
-                    JOINT_NAMES[other]
-                ),
-            );
+            let (node, other) = (shortened(&model.names[node]), JOINT_NAMES[other]);
+            let what =
+                format!("is the node {node:?}, which is {other}, too; each joint needs a node of its own");
+            violations.add(name(place), what);
             continue;
         }
         // Of the joints of one digit, none may be below one that is farther out. Flat hierarchies are allowed.
         let above = model.parents[node].and_then(|parent| hand.nearest_joint(model, parent));
         if let Some(above) = above.filter(|&above| !may_be_above(above, place)) {
-            violations.add(
-                format!("{name}, {joint}"),
-                format!(
-                    "is below {}; the joints must form a tree from the wrist to the tips, as in a hand",
-                    JOINT_NAMES[above]
-                ),
+            let above = JOINT_NAMES[above];
+            let what = format!(
+                "is below {above}; the joints must form a tree from the wrist to the tips, as in a hand"
             );
+            violations.add(name(place), what);
         }
     }
 }
@@ -316,23 +286,20 @@ fn check_unknown_fingers(model: &Model, hand: &HandNodes, has: [bool; 5], violat
     }
     let is_unknown = |node: usize| hand.joint_of(node).is_none() && model.is_bound(node);
     // A single bone is a twist or what holds a prop, two in a row are a finger.
-    let unknown: Vec<String> = (0..model.names.len())
-        .filter(|&node| {
-            let is_second = is_unknown(node) && model.parents[node].is_some_and(is_unknown);
-            is_second && hand.nearest_joint(model, node) == Some(index::WRIST)
-        })
-        .map(|node| format!("{:?}", shortened(&model.names[node])))
-        .take(8)
-        .collect();
+    let unknown = (0..model.names.len()).filter(|&node| {
+        let is_second = is_unknown(node) && model.parents[node].is_some_and(is_unknown);
+        is_second && hand.nearest_joint(model, node) == Some(index::WRIST)
+    });
+    let unknown = unknown.map(|node| format!("{:?}", shortened(&model.names[node])));
+    let unknown: Vec<String> = unknown.take(8).collect();
     if !unknown.is_empty() {
-        violations.add(
-            format!("{}, {}", hand_name(hand.side), missing.join(" and ")),
-            format!(
-                "has no nodes with its names, but there are unknown bones below the wrist: {}; if they are its joints, say which in \
-                 joint_map, and if not, take them out of the skin",
-                unknown.join(", ")
-            ),
+        let place = format!("{}, {}", hand_name(hand.side), missing.join(" and "));
+        let what = format!(
+            "has no nodes with its names, but there are unknown bones below the wrist: {}; if they are its joints, say which in \
+             joint_map, and if not, take them out of the skin",
+            unknown.join(", ")
         );
+        violations.add(place, what);
     }
 }
 

@@ -38,7 +38,7 @@ use crate::{
 use hand_nodes::{HandNodes, check_digits, hand_name, hand_nodes, joints_of};
 use model::{BindPose, Model};
 use radii::{SkinVertex, Widths};
-use rest::{RestJoints, Skeleton};
+use rest::Skeleton;
 
 /// Most nodes of a model: characters have some hundreds.
 const MAX_NODES: usize = 10_000;
@@ -107,21 +107,18 @@ impl ImportedRig {
     /// They do not show one hand each.
     pub fn joined(self, other: Self) -> Result<Self, ImportError> {
         let shown = |rig: &Self| (!rig.left.is_mirrored, !rig.right.is_mirrored);
+        let wrong = |what: &str| Err(ImportError::at("the models", what));
         let (left, right) = match (shown(&self), shown(&other)) {
             ((true, false), (false, true)) => (self.left, other.right),
             ((false, true), (true, false)) => (other.left, self.right),
             ((true, true), _) | (_, (true, true)) => {
-                return Err(ImportError::at(
-                    "the models",
-                    "show both hands in one file; leave the other out",
-                ));
+                return wrong("show both hands in one file; leave the other out");
             }
             _ => {
-                return Err(ImportError::at(
-                    "the models",
+                return wrong(
                     "show the same hand; one must be the left and the other the right one, and handedness says which hand the first \
                      shows if the names of its nodes do not",
-                ));
+                );
             }
         };
         let warnings = [self.warnings, other.warnings].concat();
@@ -142,39 +139,29 @@ pub fn read_rig(
     source: RigSource<'_>,
     limits: MeshLimits,
 ) -> Result<ImportedRig, Vec<ImportError>> {
-    read_hands(bytes, &source, limits).map_err(Violations::into_errors)
-}
-
-fn read_hands(bytes: &[u8], source: &RigSource<'_>, limits: MeshLimits) -> Result<ImportedRig, Violations> {
     check_count("the file", "bytes", bytes.len() as u64, limits.bytes)?;
     if Format::of(bytes) != Format::Gltf {
-        return Err(
-            ImportError::at("the model", "is no glTF; a hand is required as GLB, glTF or VRM").into(),
-        );
+        let what = "is no glTF; a hand is required as GLB, glTF or VRM";
+        return Err(ImportError::at("the model", what).into());
     }
     let opened = gltf::open(bytes, limits.unwelded(), Stop::NEVER)?;
-    check_count(
-        "the mesh",
-        "nodes",
-        opened.document.nodes().len() as u64,
-        MAX_NODES,
-    )?;
+    let nodes = opened.document.nodes().len() as u64;
+    check_count("the mesh", "nodes", nodes, MAX_NODES)?;
     let model = Model::of(&opened, Scene::of(&opened.document))?;
     let mut violations = Violations::default();
     let mut warnings = Vec::new();
-    let vrm = names::vrm_joints(&opened.json).unwrap_or_else(|error| {
+    let vrm = names::vrm_hands(&opened.json, &model).unwrap_or_else(|error| {
         warnings.push(format!(
             "the VRM extension cannot be read, so joints are recognised by names: {error}"
         ));
         None
     });
-    let hands = hand_nodes(&model, vrm.as_deref(), source, &mut violations);
-    if violations.len() > 0 {
-        return Err(violations);
-    }
+    let hands = hand_nodes(&model, vrm, &source, &mut violations);
+    violations.into_result()?;
+    let mut violations = Violations::default();
     let mut read = Vec::new();
     for hand in &hands {
-        read.extend(read_hand(&model, hand, source, &mut warnings, &mut violations));
+        read.extend(read_hand(&model, hand, &source, &mut warnings, &mut violations));
     }
     violations.into_result()?;
     Ok(both(&read, warnings))
@@ -187,11 +174,11 @@ fn read_hands(bytes: &[u8], source: &RigSource<'_>, limits: MeshLimits) -> Resul
 /// Every violation; see [`ImportError`].
 pub fn rig_at_rest(hands: &[HandJoints], source: RigSource<'_>) -> Result<ImportedRig, Vec<ImportError>> {
     let mut violations = Violations::default();
-    let made: Vec<ImportedHand> = hands
+    let made = hands
         .iter()
-        .filter_map(|hand| hand_at_rest(hand, &source, &mut violations))
-        .collect();
-    violations.into_result().map_err(Violations::into_errors)?;
+        .filter_map(|hand| hand_at_rest(hand, &source, &mut violations));
+    let made: Vec<ImportedHand> = made.collect();
+    violations.into_result()?;
     Ok(both(&made, Vec::new()))
 }
 
@@ -211,7 +198,7 @@ fn hand_at_rest(
     if violations.len() > before {
         return None;
     }
-    let skeleton = Skeleton::new(&RestJoints { side, positions }, source.reference, violations)?;
+    let skeleton = Skeleton::new(side, &positions, source.reference, violations)?;
     let widths = Widths::given(hand.joints.map(|joint| joint.radius)).changed(source);
     let rig = skeleton.rig(&widths, source);
     Some(ImportedHand {
@@ -274,9 +261,8 @@ fn read_hand(
     let side = hand.side;
     let wrist = hand.joints[index::WRIST]?;
     // The joint that each node belongs to: its own, or that of the nearest node above it, up to the wrist.
-    let joints: Vec<Option<usize>> = (0..model.names.len())
-        .map(|node| hand.nearest_joint(model, node))
-        .collect();
+    let nodes = 0..model.names.len();
+    let joints: Vec<Option<usize>> = nodes.map(|node| hand.nearest_joint(model, node)).collect();
     let bind = BindPose::new(model, &hand.joints, wrist, |node| joints[node].is_some());
     if let Some(wrong) = wrong_scale(bind.scene_from_node(wrist)) {
         violations.add(hand_name(side), wrong);
@@ -286,24 +272,18 @@ fn read_hand(
         let bound = bind.scene_from_node(node?).w_axis.truncate();
         Some(as_right(side, bound.as_vec3()))
     });
-    let rest = RestJoints { side, positions };
-    let skeleton = Skeleton::new(&rest, source.reference, violations)?;
+    let skeleton = Skeleton::new(side, &positions, source.reference, violations)?;
     let wrist_from_scene = skeleton.frame_from_wrist.inverse();
-    let scene_from_node: Vec<Option<DMat4>> = joints
-        .iter()
-        .enumerate()
-        .map(|(node, joint)| joint.map(|_| bind.scene_from_node(node)))
-        .collect();
-    let skin: Vec<SkinVertex> = model
-        .vertices
-        .iter()
-        .filter_map(|vertex| {
-            let (joint, scene_from_node) = joints[vertex.node].zip(scene_from_node[vertex.node])?;
-            let position = scene_from_node.transform_point3(vertex.position).as_vec3();
-            let position = wrist_from_scene.transform_point(as_right(side, position));
-            position.is_finite().then_some(SkinVertex { joint, position })
-        })
-        .collect();
+    let placed = joints.iter().enumerate();
+    let placed = placed.map(|(node, joint)| Some(((*joint)?, bind.scene_from_node(node))));
+    let placed: Vec<Option<(usize, DMat4)>> = placed.collect();
+    let skin = model.vertices.iter().filter_map(|vertex| {
+        let (joint, scene_from_node) = placed[vertex.node]?;
+        let position = scene_from_node.transform_point3(vertex.position).as_vec3();
+        let position = wrist_from_scene.transform_point(as_right(side, position));
+        position.is_finite().then_some(SkinVertex { joint, position })
+    });
+    let skin: Vec<SkinVertex> = skin.collect();
     let measured = Widths::of(&skin, &skeleton, source.reference);
     check::HandCheck {
         side,
@@ -316,10 +296,7 @@ fn read_hand(
     .check(warnings, violations)?;
     let widths = measured.changed(source);
     let mut rig = skeleton.rig(&widths, source);
-    let mut at_rest = skeleton.joints;
-    for (tip, end) in index::TIP_OF_DIGIT.into_iter().zip(widths.tips) {
-        at_rest[tip] = end.unwrap_or(at_rest[tip]);
-    }
+    let at_rest = skeleton.joints_with_tips(&widths);
     // The stumps of missing fingers are no flesh of the palm.
     if skeleton.has.iter().all(|&has| has) {
         rig.palm_flesh = palm::flesh(&rig, skeleton.size, &at_rest, &skin);
@@ -350,8 +327,7 @@ fn wrong_scale(bound: DMat4) -> Option<String> {
             "is scaled by {least:.4} to {most:.4} along its axes; the scale must be the same along all"
         ))
     } else if bound.determinant() < 0.0 {
-        let what = "is mirrored by a negative scale; apply the scale in the program that made the model";
-        Some(what.to_owned())
+        Some("is mirrored by a negative scale; apply the scale in the program that made the model".to_owned())
     } else {
         None
     }

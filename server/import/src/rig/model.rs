@@ -9,7 +9,7 @@ use grasp_synthesis::base::{pose::Pose, stop::Stop};
 use super::binding::PosedNode;
 use crate::{
     MeshLimits,
-    error::{ImportError, Violations},
+    error::ImportError,
     gltf::{
         Buffers, Opened, Scene, SkinnedMesh, each_weight, in_primitive, inverse_binds, open, skinned_mesh,
         walk,
@@ -31,8 +31,6 @@ pub(super) struct Model {
     node_from_mesh: Vec<HashMap<usize, DMat4>>,
     /// The vertices of all meshes that the scene shows.
     pub(super) vertices: Vec<BoundVertex>,
-    /// How many vertices each node moves most.
-    moved: Vec<usize>,
 }
 
 /// A vertex of a skin, where it is bound.
@@ -48,29 +46,22 @@ pub(super) struct BoundVertex {
 impl Model {
     /// Reads nodes, skins and their vertices.
     pub(super) fn of(opened: &Opened<'_>, scene: Scene) -> Result<Self, ImportError> {
-        let Opened {
-            document, buffers, ..
-        } = opened;
+        let (document, buffers) = (&opened.document, &opened.buffers);
         let mut node_from_mesh: Vec<HashMap<usize, DMat4>> = Vec::new();
         for skin in document.skins() {
             let joints = skin.joints().map(|joint| joint.index());
             node_from_mesh.push(joints.zip(inverse_binds(&skin, buffers)?).collect());
         }
         let vertices = vertices(document, buffers, &scene.shown, &node_from_mesh)?;
-        let mut moved = vec![0; scene.parents.len()];
-        for vertex in &vertices {
-            moved[vertex.node] += 1;
-        }
+        let names = document
+            .nodes()
+            .map(|node| node.name().unwrap_or_default().to_owned());
         Ok(Self {
-            names: document
-                .nodes()
-                .map(|node| node.name().unwrap_or_default().to_owned())
-                .collect(),
+            names: names.collect(),
             parents: scene.parents,
             scene_from_node: scene.scene_from_node,
             node_from_mesh,
             vertices,
-            moved,
         })
     }
 
@@ -81,7 +72,7 @@ impl Model {
 
     /// How many vertices the node moves most.
     pub(super) fn moved_by(&self, node: usize) -> usize {
-        self.moved[node]
+        self.vertices.iter().filter(|vertex| vertex.node == node).count()
     }
 
     /// Where a node is when nothing has moved.
@@ -110,8 +101,7 @@ pub(super) struct BindPose<'a> {
 }
 
 impl<'a> BindPose<'a> {
-    /// The bind pose of a hand with these joints, in which the wrist is where the scene has it. `is_of_hand` tells the nodes
-    /// whose vertices are the hand's.
+    /// The bind pose of a hand, whose wrist is where the scene has it; `is_of_hand` tells the nodes whose vertices are the hand's.
     pub(super) fn new(
         model: &'a Model,
         joints: &[Option<usize>],
@@ -124,12 +114,8 @@ impl<'a> BindPose<'a> {
         }
         let mut skins: Vec<usize> = (0..counts.len()).collect();
         let joints_in = |skin: usize| {
-            let skin = &model.node_from_mesh[skin];
-            joints
-                .iter()
-                .flatten()
-                .filter(|node| skin.contains_key(node))
-                .count()
+            let known = |node: &&usize| model.node_from_mesh[skin].contains_key(node);
+            joints.iter().flatten().filter(known).count()
         };
         skins.sort_by_cached_key(|&skin| std::cmp::Reverse((counts[skin], joints_in(skin))));
         let mut node_from_mesh: HashMap<usize, DMat4> = HashMap::new();
@@ -261,10 +247,6 @@ pub fn posed_skin(
     pose: &ModelPose<'_>,
     limits: MeshLimits,
 ) -> Result<PosedSkin, Vec<ImportError>> {
-    skin_at(bytes, pose, limits).map_err(Violations::into_errors)
-}
-
-fn skin_at(bytes: &[u8], pose: &ModelPose<'_>, limits: MeshLimits) -> Result<PosedSkin, Violations> {
     let opened = open(bytes, limits, Stop::NEVER)?;
     let scene = Scene::of(&opened.document);
     let nodes: Vec<Node<'_>> = opened.document.nodes().collect();
@@ -295,26 +277,19 @@ fn skin_at(bytes: &[u8], pose: &ModelPose<'_>, limits: MeshLimits) -> Result<Pos
 
 /// The frames of a hand's nodes.
 fn frames(scene: &Scene, nodes: &[Node<'_>], root: usize, pose: &ModelPose<'_>) -> HashMap<usize, DMat4> {
-    let Pose {
-        position,
-        orientation,
-    } = pose.frame_from_root;
     let (scale, _, _) = scene.scene_from_node[root].to_scale_rotation_translation();
     let frame_from_root = DMat4::from_scale_rotation_translation(
         scale * f64::from(pose.scale),
-        orientation.as_dquat(),
-        position.as_dvec3(),
+        pose.frame_from_root.orientation.as_dquat(),
+        pose.frame_from_root.position.as_dvec3(),
     );
     let mut frames = HashMap::from([(root, frame_from_root)]);
     for (node, parent) in walk(nodes, &[root]) {
         let Some(parent) = parent else { continue };
         let local = scene.scene_from_node[parent].inverse() * scene.scene_from_node[node];
         let (scale, mut rotation, mut translation) = local.to_scale_rotation_translation();
-        if let Some(moved) = pose
-            .nodes
-            .iter()
-            .find(|moved| Some(moved.name) == nodes[node].name())
-        {
+        let name = nodes[node].name();
+        if let Some(moved) = pose.nodes.iter().find(|moved| Some(moved.name) == name) {
             rotation = moved.rotation.as_dquat();
             translation = moved.translation.map_or(translation, Vec3::as_dvec3);
         }

@@ -14,6 +14,7 @@ use grasp_synthesis::model::hand::{
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::{hand_nodes::HandNodes, model::Model};
 use crate::text::name_words;
 
 /// What a name says about a node.
@@ -21,17 +22,8 @@ use crate::text::name_words;
 pub(super) struct NodeName {
     /// The hand, if the name has one.
     pub(super) side: Option<Handedness>,
-    /// The part of the hand.
-    pub(super) part: Part,
-}
-
-/// A part of a hand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
-    /// The wrist, or the hand as a whole.
-    Wrist,
-    /// A segment of a digit.
-    Segment(Digit, Segment),
+    /// The segment of a digit; `None` for the wrist, or the hand as a whole.
+    pub(super) segment: Option<(Digit, Segment)>,
 }
 
 /// A segment of a digit. What `Proximal` of a thumb and numbers mean depends on which others the digit has; see
@@ -94,12 +86,9 @@ pub(super) fn read(name: &str) -> Option<NodeName> {
             _ => {}
         }
     }
-    let part = match (digit, segment) {
-        (Some(digit), segment) => Part::Segment(digit, segment.unwrap_or(Segment::Unnumbered)),
-        (None, None) if is_wrist => Part::Wrist,
-        _ => return None,
-    };
-    Some(NodeName { side, part })
+    let is_hand = digit.is_some() || is_wrist && segment.is_none();
+    let segment = digit.map(|digit| (digit, segment.unwrap_or(Segment::Unnumbered)));
+    is_hand.then_some(NodeName { side, segment })
 }
 
 /// A number, or a letter that counts like one.
@@ -110,8 +99,7 @@ fn number(word: &str) -> Option<u8> {
     }
 }
 
-/// The digit and the bone's number of what follows "Finger" in names of 3ds Max's Biped: 0 to 4, and from the second bone on its
-/// number less one.
+/// The digit and the bone's number after "Finger" in names of Biped: 0 to 4, and from the second bone on its number less one.
 fn biped(word: &str) -> Option<(Digit, u8)> {
     let (digit, bone) = match word.as_bytes() {
         [digit] => (digit, 1),
@@ -124,9 +112,8 @@ fn biped(word: &str) -> Option<(Digit, u8)> {
 
 /// The joint with a name of `WebXR`, in any spelling of its words.
 pub(super) fn joint_named(name: &str) -> Option<usize> {
-    JOINT_NAMES
-        .iter()
-        .position(|known| name_words(known) == name_words(name))
+    let words = name_words(name);
+    JOINT_NAMES.iter().position(|known| name_words(known) == words)
 }
 
 /// The part of a document that is read here.
@@ -136,27 +123,10 @@ struct VrmDocument {
     extensions: Value,
 }
 
-/// A joint of a hand and its node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct VrmJoint {
-    pub(super) side: Handedness,
-    /// In `OpenXR` order.
-    pub(super) joint: usize,
-    pub(super) node: usize,
-}
-
-/// The joints of hands in the extension of VRM 1.0 or 0.x; `None` if the document has neither.
-///
-/// # Errors
-/// Why the extension cannot be read.
-pub(super) fn vrm_joints(json: &[u8]) -> Result<Option<Vec<VrmJoint>>, String> {
+/// The joints of hands in the extension of VRM 1.0 or 0.x; `None` if the document has neither. Fails if it cannot be read.
+pub(super) fn vrm_hands(json: &[u8], model: &Model) -> Result<Option<[HandNodes; 2]>, String> {
     let document: VrmDocument = serde_json::from_slice(json).map_err(|error| error.to_string())?;
-    let extension = |name| {
-        document
-            .extensions
-            .get(name)
-            .filter(|extension| !extension.is_null())
-    };
+    let extension = |name| document.extensions.get(name).filter(|found| !found.is_null());
     let Some(vrm) = extension("VRMC_vrm").or_else(|| extension("VRM")) else {
         return Ok(None);
     };
@@ -173,18 +143,19 @@ pub(super) fn vrm_joints(json: &[u8]) -> Result<Option<Vec<VrmJoint>>, String> {
             .collect(),
         _ => return Err("its humanoid names no bones".to_owned()),
     };
-    let mut joints = Vec::new();
-    for (prefix, side) in [("left", Handedness::Left), ("right", Handedness::Right)] {
+    let mut hands = HandNodes::NONE;
+    for (prefix, hand) in ["left", "right"].into_iter().zip(&mut hands) {
         let has = |bone: &str| bones.contains_key(&format!("{prefix}{bone}"));
         // Metacarpal, proximal and distal since 1.0; of the older names, only these two can mean something else.
         let is_old = has("ThumbIntermediate") && !has("ThumbMetacarpal");
-        let of_side = bones.iter().filter_map(|(bone, &node)| {
-            let joint = joint_of_bone(bone.strip_prefix(prefix)?, is_old)?;
-            Some(VrmJoint { side, joint, node })
-        });
-        joints.extend(of_side);
+        for (bone, &node) in bones.iter().filter(|&(_, &node)| node < model.names.len()) {
+            let part = bone.strip_prefix(prefix);
+            if let Some(joint) = part.and_then(|part| joint_of_bone(part, is_old)) {
+                hand.joints[joint] = Some(node);
+            }
+        }
     }
-    Ok(Some(joints))
+    Ok(Some(hands))
 }
 
 /// The joint of a bone without its side; `is_old` if the thumb's bones have the names of a finger's.
@@ -192,11 +163,10 @@ fn joint_of_bone(part: &str, is_old: bool) -> Option<usize> {
     if part == "Hand" {
         return Some(index::WRIST);
     }
-    let digits = ["Thumb", "Index", "Middle", "Ring", "Little"];
-    let (digit, bone) = digits
-        .iter()
-        .enumerate()
-        .find_map(|(digit, name)| Some((digit, part.strip_prefix(name)?)))?;
+    let mut digits = ["Thumb", "Index", "Middle", "Ring", "Little"]
+        .into_iter()
+        .enumerate();
+    let (digit, bone) = digits.find_map(|(digit, name)| Some((digit, part.strip_prefix(name)?)))?;
     let bones = if digit == 0 && !is_old {
         ["Metacarpal", "Proximal", "Distal"]
     } else {
@@ -210,58 +180,31 @@ fn joint_of_bone(part: &str, is_old: bool) -> Option<usize> {
 mod tests {
     use super::*;
 
-    fn segment(digit: Digit, segment: Segment) -> Part {
-        Part::Segment(digit, segment)
-    }
-
     #[test]
     fn knows_the_names_of_the_usual_engines() {
+        use Digit::{Index, Little, Middle, Ring};
         use Segment::{Distal, Intermediate, Metacarpal, Number, Proximal};
         let (left, right) = (Some(Handedness::Left), Some(Handedness::Right));
-        for (name, side, part) in [
-            (
-                "index-finger-phalanx-proximal",
-                None,
-                segment(Digit::Index, Proximal),
-            ),
-            ("CC_Base_R_Hand", right, Part::Wrist),
-            ("CC_Base_R_Index1", right, segment(Digit::Index, Number(1))),
-            ("c_index1_base.r", right, segment(Digit::Index, Metacarpal)),
-            (
-                "XRHand_LittleMetacarpal",
-                None,
-                segment(Digit::Little, Metacarpal),
-            ),
-            ("L_MiddleIntermediate", left, segment(Digit::Middle, Intermediate)),
-            (
-                "mixamorig1:LeftHandPinky4",
-                left,
-                segment(Digit::Little, Number(4)),
-            ),
-            ("Right Ring Distal", right, segment(Digit::Ring, Distal)),
-            ("R_IndexKnuckle", right, segment(Digit::Index, Proximal)),
-            ("R_MiddleMiddleJoint", right, segment(Digit::Middle, Intermediate)),
-            ("R_index_b", right, segment(Digit::Index, Number(2))),
+        for (name, side, segment) in [
+            ("index-finger-phalanx-proximal", None, Some((Index, Proximal))),
+            ("CC_Base_R_Hand", right, None),
+            ("CC_Base_R_Index1", right, Some((Index, Number(1)))),
+            ("c_index1_base.r", right, Some((Index, Metacarpal))),
+            ("XRHand_LittleMetacarpal", None, Some((Little, Metacarpal))),
+            ("L_MiddleIntermediate", left, Some((Middle, Intermediate))),
+            ("mixamorig1:LeftHandPinky4", left, Some((Little, Number(4)))),
+            ("Right Ring Distal", right, Some((Ring, Distal))),
+            ("R_IndexKnuckle", right, Some((Index, Proximal))),
+            ("R_MiddleMiddleJoint", right, Some((Middle, Intermediate))),
+            ("R_index_b", right, Some((Index, Number(2)))),
         ] {
-            assert_eq!(read(name), Some(NodeName { side, part }), "{name}");
+            assert_eq!(read(name), Some(NodeName { side, segment }), "{name}");
         }
-        for other in [
-            "LeftForeArm",
-            "ik_hand_l",
-            "Head",
-            "lowerarm_twist_01_l",
-            "LeftHandle",
-            "spine_03",
-            "r_index_knuckle_marker",
-        ] {
+        for other in
+            "LeftForeArm|ik_hand_l|Head|lowerarm_twist_01_l|LeftHandle|spine_03|r_index_knuckle_marker"
+                .split('|')
+        {
             assert_eq!(read(other), None, "{other}");
         }
-    }
-
-    #[test]
-    fn joints_are_named_in_any_spelling() {
-        assert_eq!(joint_named("index-finger-phalanx-proximal"), Some(7));
-        assert_eq!(joint_named("IndexFingerPhalanxProximal"), Some(7));
-        assert_eq!(joint_named("index"), None);
     }
 }

@@ -23,8 +23,7 @@ const FEWEST: usize = 60;
 /// Most vertices that are compared.
 const MAX_VERTICES: usize = 600;
 
-/// Distance in metres, at an adult's size, within which nine in ten of the palmar vertices are when the flesh of the built-in hands
-/// is as good: it fits their skin that well, in several poses.
+/// Distance in metres, at an adult's size, within which nine in ten palmar vertices of the built-in hands are.
 const AS_FITTED: f32 = 0.0018;
 
 /// Distances in metres beyond which a vertex counts no more than at it: wrinkles, strays, and what follows the wrist elsewhere.
@@ -45,8 +44,7 @@ const ROUNDS: usize = 4;
 /// Least radius of a solid, in metres at an adult's size.
 const MIN_RADIUS: f32 = 0.002;
 
-/// The flesh of a right hand's palm; `None` if too few vertices show it. `joints` are the joints where the skin is bound, in the frame
-/// of the wrist, as the skin's vertices are.
+/// The flesh of a right hand's palm; `None` if too few vertices show it. `joints` are those where the skin is bound.
 pub(super) fn flesh(
     rig: &Rig,
     size: f32,
@@ -54,34 +52,6 @@ pub(super) fn flesh(
     skin: &[SkinVertex],
 ) -> Option<Box<PalmFlesh>> {
     let bound = bound_frames(rig, joints);
-    let pose = bound_pose(rig, joints);
-    // The ball of the thumb is where the posed rig has it.
-    let posed_from_bound = hand_frames(rig, &pose).digits[0].links[0] * bound.digits[0].links[0].inverse();
-    let is_of_palm = |joint: usize| joint == index::WRIST || index::FIRST_OF_DIGIT[1..].contains(&joint);
-    let vertices: Vec<Vec3> = skin
-        .iter()
-        .filter_map(|vertex| {
-            if is_of_palm(vertex.joint) {
-                // What is behind the wrist is forearm.
-                Some(vertex.position).filter(|position| position.y > 0.0)
-            } else if vertex.joint == index::FIRST_OF_DIGIT[0] {
-                Some(posed_from_bound.transform_point(vertex.position))
-            } else {
-                None
-            }
-        })
-        .collect();
-    if vertices.len() < FEWEST {
-        return None;
-    }
-    let every = vertices.len().div_ceil(MAX_VERTICES);
-    let vertices: Vec<Vec3> = vertices.into_iter().step_by(every).collect();
-    let fit = Fit::new(rig, size, pose, &vertices);
-    (fit.distance_of_most() > AS_FITTED * size).then(|| Box::new(fit.best()))
-}
-
-/// The pose of the rig nearest to joints in the frame of the wrist.
-fn bound_pose(rig: &Rig, joints: &[Vec3; JOINT_COUNT]) -> HandPose {
     let at_rest = HandJoints {
         handedness: Handedness::Right,
         joints: joints.map(|position| Joint {
@@ -89,7 +59,27 @@ fn bound_pose(rig: &Rig, joints: &[Vec3; JOINT_COUNT]) -> HandPose {
             radius: 1.0,
         }),
     };
-    fitted(rig, &at_rest)
+    let pose = fitted(rig, &at_rest);
+    // The ball of the thumb is where the posed rig has it.
+    let posed_from_bound = hand_frames(rig, &pose).digits[0].links[0] * bound.digits[0].links[0].inverse();
+    let is_of_palm = |joint: usize| joint == index::WRIST || index::FIRST_OF_DIGIT[1..].contains(&joint);
+    let vertices = skin.iter().filter_map(|vertex| {
+        if is_of_palm(vertex.joint) {
+            // What is behind the wrist is forearm.
+            Some(vertex.position).filter(|position| position.y > 0.0)
+        } else {
+            let is_of_thumb = vertex.joint == index::FIRST_OF_DIGIT[0];
+            is_of_thumb.then(|| posed_from_bound.transform_point(vertex.position))
+        }
+    });
+    let vertices: Vec<Vec3> = vertices.collect();
+    if vertices.len() < FEWEST {
+        return None;
+    }
+    let every = vertices.len().div_ceil(MAX_VERTICES);
+    let vertices: Vec<Vec3> = vertices.into_iter().step_by(every).collect();
+    let fit = Fit::new(rig, size, pose, &vertices);
+    (fit.distance_of_most() > AS_FITTED * size).then(|| Box::new(fit.best()))
 }
 
 /// Flesh that is being fitted.
@@ -135,12 +125,11 @@ impl<'a> Fit<'a> {
     /// The distance from the solids that nine in ten of the palmar vertices do not exceed.
     fn distance_of_most(&self) -> f32 {
         let palmar = (0..self.vertices.len()).filter(|&vertex| self.weights[vertex] > BACK);
-        let mut distances: Vec<f32> = palmar
-            .map(|vertex| {
-                let own = self.distances.iter().map(|solid| solid[vertex]);
-                own.fold(self.from_links[vertex], f32::min).abs()
-            })
-            .collect();
+        let distances = palmar.map(|vertex| {
+            let own = self.distances.iter().map(|solid| solid[vertex]);
+            own.fold(self.from_links[vertex], f32::min).abs()
+        });
+        let mut distances: Vec<f32> = distances.collect();
         distances.sort_by(f32::total_cmp);
         distances.get(distances.len() * 9 / 10).copied().unwrap_or(0.0)
     }
@@ -164,14 +153,12 @@ impl<'a> Fit<'a> {
 
     /// Changes the ends of one solid by a step wherever that brings the skin nearer.
     fn improve(&mut self, flesh: &mut PalmFlesh, solid: usize, step: f32) {
-        let others: Vec<f32> = (0..self.vertices.len())
-            .map(|vertex| {
-                let others = (0..FLESH_SOLIDS).filter(|&other| other != solid);
-                others.fold(self.from_links[vertex], |least, other| {
-                    least.min(self.distances[other][vertex])
-                })
-            })
-            .collect();
+        let others = (0..self.vertices.len()).map(|vertex| {
+            let others = (0..FLESH_SOLIDS).filter(|&other| other != solid);
+            let others = others.map(|other| self.distances[other][vertex]);
+            others.fold(self.from_links[vertex], f32::min)
+        });
+        let others: Vec<f32> = others.collect();
         let mut least = self.error(flesh, &others, &self.distances[solid]);
         for end in 0..2 {
             for change in [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)] {
@@ -216,10 +203,8 @@ impl<'a> Fit<'a> {
 }
 
 fn distances(solid: &TaperedCapsule, vertices: &[Vec3]) -> Vec<f32> {
-    vertices
-        .iter()
-        .map(|&vertex| solid.signed_distance(vertex))
-        .collect()
+    let distances = vertices.iter().map(|&vertex| solid.signed_distance(vertex));
+    distances.collect()
 }
 
 #[cfg(test)]
@@ -253,13 +238,12 @@ mod tests {
         for change in [0.004, -0.004] {
             // A skin by formula: that of palms whose solids are out of the palm or behind it.
             let mut other = adult.clone();
-            let mut flesh = PalmFlesh::default();
+            let flesh = other.palm_flesh.insert(Box::default());
             flesh
                 .0
                 .as_flattened_mut()
                 .iter_mut()
                 .for_each(|end| end.offset = change);
-            other.palm_flesh = Some(Box::new(flesh));
             let solids = HandSolids::of_pose(&other, &pose);
             let own: Vec<&TaperedCapsule> = solids.palm.iter().chain(&solids.thenar).collect();
             let mut skin = Vec::new();
@@ -272,9 +256,8 @@ mod tests {
                         let along = ring as f32 / 11.0;
                         let ray = glam::Quat::from_axis_angle(axis, angle) * across;
                         let position = solid.at(along) + solid.radius_at(along) * ray;
-                        let is_covered = solids
-                            .iter()
-                            .any(|other| other != *solid && other.signed_distance(position) < -1e-4);
+                        let covers = |other: &TaperedCapsule| other.signed_distance(position) < -1e-4;
+                        let is_covered = solids.iter().any(|other| other != *solid && covers(other));
                         if !is_covered && position.y > 0.0 {
                             let joint = if place < 10 {
                                 index::WRIST
@@ -296,16 +279,6 @@ mod tests {
             assert!(at(&before, 0.5) > 0.0015, "{}", at(&before, 0.5));
             assert!(at(&after, 0.5) < 0.0006, "{change}: {}", at(&after, 0.5));
             assert!(at(&after, 0.9) < 0.002, "{change}: {}", at(&after, 0.9));
-            let mirrored = HandSolids::of_pose(
-                &fitted.mirrored(),
-                &HandPose {
-                    digits: fitted.mirrored().stretched(),
-                    ..pose
-                },
-            );
-            let straight = HandSolids::of_pose(&fitted, &pose);
-            let flipped = mirrored.palm[3].start * Vec3::new(-1.0, 1.0, 1.0);
-            assert!(flipped.distance(straight.palm[3].start) < 1e-5);
         }
     }
 }

@@ -94,8 +94,9 @@ impl Widths {
         let tip = index::TIP_OF_DIGIT[digit];
         let base = tip - 3;
         let of_joint = |joint: usize| {
+            let is_own = move |own: usize| own == joint || joint + 1 == tip && own == tip;
             skin.iter()
-                .filter(move |vertex| vertex.joint == joint || joint + 1 == tip && vertex.joint == tip)
+                .filter(move |vertex| is_own(vertex.joint))
                 .map(|vertex| vertex.position)
         };
         let end = skin_end(of_joint(tip - 1), skeleton.joints[tip - 1], skeleton.joints[tip]);
@@ -178,10 +179,10 @@ impl Widths {
 
     fn measure_palm(&mut self, skin: &[SkinVertex], skeleton: &Skeleton) {
         for joint in index::FIRST_OF_DIGIT.into_iter().chain([index::WRIST]) {
-            let mut distances: Vec<f32> = skin
+            let distances = skin
                 .iter()
-                .map(|vertex| vertex.position.distance(skeleton.joints[joint]))
-                .collect();
+                .map(|vertex| vertex.position.distance(skeleton.joints[joint]));
+            let mut distances: Vec<f32> = distances.collect();
             // A few stray vertices inside do not count.
             let place = FEWEST.min(distances.len()) - 1;
             let (_, &mut nearest, _) = distances.select_nth_unstable_by(place, f32::total_cmp);
@@ -192,10 +193,8 @@ impl Widths {
         // Coarse skins have few vertices there.
         let depth = PALM_AROUND.iter().find_map(|around| {
             let around = around * self.radii[index::PALM];
-            let depths = skin
-                .iter()
-                .map(|vertex| vertex.position - palm)
-                .filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
+            let offsets = skin.iter().map(|vertex| vertex.position - palm);
+            let depths = offsets.filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
             median(depths.map(|offset| offset.z).collect(), FEWEST)
         });
         if let Some(depth) = depth {
@@ -212,17 +211,17 @@ impl Widths {
     }
 }
 
-/// The radius of the sphere that ends a last bone: the solid between it, one radius before the tip, and the joint with its
-/// radius lies on the skin in the median.
+/// The radius of the sphere that ends a last bone: the solid between it and the joint lies on the skin in the median.
 fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_joint: f32) -> Option<f32> {
     let axis = (end - start).normalize_or(Vec3::Y);
     let length = start.distance(end);
-    let around: Vec<(f32, f32)> = vertices
-        .map(|vertex| {
-            let along = (vertex - start).dot(axis);
-            (along, (vertex - start).reject_from_normalized(axis).length())
-        })
-        .filter(|(along, _)| (TIP_BAND[0] * length..TIP_BAND[1] * length).contains(along))
+    let band = TIP_BAND.map(|share| share * length);
+    let around = vertices.map(|vertex| {
+        let offset = vertex - start;
+        (offset.dot(axis), offset.reject_from_normalized(axis).length())
+    });
+    let around: Vec<(f32, f32)> = around
+        .filter(|(along, _)| (band[0]..band[1]).contains(along))
         .collect();
     let mut radius = TIP_SHARE * at_joint;
     for _ in 0..4 {
@@ -235,8 +234,7 @@ fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_
     Some(radius)
 }
 
-/// Where the skin of the last bone ends along the line from its joint to where its end is expected; `None` if too few vertices follow
-/// it.
+/// Where the skin of the last bone ends toward the expected end; `None` if too few vertices follow it.
 fn skin_end(vertices: impl Iterator<Item = Vec3>, start: Vec3, expected: Vec3) -> Option<Vec3> {
     let bone = expected - start;
     let (direction, length) = (bone.normalize_or(Vec3::Y), bone.length());

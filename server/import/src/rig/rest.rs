@@ -15,16 +15,15 @@ use grasp_synthesis::{
 
 use super::{
     RigSource,
-    hand_nodes::{hand_name, joints_of},
+    hand_nodes::{hand_name, joint_name, joints_of},
     radii::Widths,
 };
 use crate::error::Violations;
 
 /// Smallest and largest length of a bone, in metres: from a doll's to a giant's.
-const BONE_RANGE: std::ops::RangeInclusive<f32> = 0.002..=0.25;
+const BONE_RANGE: [f32; 2] = [0.002, 0.25];
 
-/// Smallest shares of the palm's breadth by which the thumb's first and second joint must be on the index finger's side of the
-/// palm's middle. The built-in hands have 0.4 and 0.8.
+/// Least shares of the palm's breadth that the thumb's first two joints are on the index finger's side; hands have 0.4 and 0.8.
 const THUMB_BESIDE: [f32; 2] = [-0.1, 0.2];
 
 /// Diameter of the thumb's first link relative to its second joint's, as in the built-in rigs.
@@ -32,15 +31,6 @@ const THUMB_BASE: f32 = 1.24 / 1.1;
 
 /// Mean bend of the fingers, in radians, beyond which they are bent backward.
 const BENT_BACK: f32 = -0.15;
-
-/// The joints of a hand at rest, as of a right hand in any frame, in metres.
-#[derive(Clone, Debug)]
-pub(super) struct RestJoints {
-    /// What the hand is, for messages. The joints of a left hand are mirrored.
-    pub(super) side: Handedness,
-    /// By `OpenXR` index; tips, the fingers' metacarpals, the palm and all joints of missing fingers may be absent.
-    pub(super) positions: [Option<Vec3>; JOINT_COUNT],
-}
 
 /// The parts of a hand's skeleton in its wrist's frame.
 #[derive(Clone, Debug)]
@@ -78,7 +68,7 @@ fn neighbours(has: [bool; 4], finger: usize) -> Option<Neighbours> {
     Some(Neighbours { before, after, share })
 }
 
-/// A bone's ends as `OpenXR` indices.
+/// Bones' ends as `OpenXR` indices.
 fn bones() -> impl Iterator<Item = (usize, usize)> {
     (0..5).map(base_of).flat_map(|base| {
         let links = (base..base + 3).map(|joint| (joint, joint + 1));
@@ -117,34 +107,34 @@ impl PalmFrame {
 
 impl Skeleton {
     /// Places the wrist's frame and completes the joints; adds a violation for every joint that cannot be that of a hand.
-    pub(super) fn new(rest: &RestJoints, reference: &Rig, violations: &mut Violations) -> Option<Self> {
-        let name = hand_name(rest.side);
+    /// `positions` are the joints at rest by `OpenXR` index, as of a right hand in any frame, in metres; tips, the fingers'
+    /// metacarpals, the palm and all joints of missing fingers may be absent. `side` is for messages.
+    pub(super) fn new(
+        side: Handedness,
+        positions: &[Option<Vec3>; JOINT_COUNT],
+        reference: &Rig,
+        violations: &mut Violations,
+    ) -> Option<Self> {
         let before = violations.len();
-        for (joint, position) in rest.positions.iter().enumerate() {
+        for (joint, position) in positions.iter().enumerate() {
             if position.is_some_and(|position| !position.is_finite()) {
-                violations.add(
-                    format!("{name}, {}", JOINT_NAMES[joint]),
-                    "is not at a finite place",
-                );
+                violations.add(joint_name(side, joint), "is not at a finite place");
             }
         }
-        let at = |joint: usize| rest.positions[joint].filter(|position| position.is_finite());
+        let at = |joint: usize| positions[joint].filter(|position| position.is_finite());
         for (start, end) in bones() {
             // The thumb's metacarpal may start at the wrist.
             let may_coincide = (start, end) == (index::WRIST, base_of(0));
             if let (Some(from), Some(to)) = (at(start), at(end)) {
                 let length = from.distance(to);
-                if length > *BONE_RANGE.end() || length < *BONE_RANGE.start() && !may_coincide {
-                    violations.add(
-                        format!("{name}, {}", JOINT_NAMES[end]),
-                        format!(
-                            "is {length:.4} m from {}; a bone of a hand must be {} to {} m long, after units and the \
-                             armature's scale",
-                            JOINT_NAMES[start],
-                            BONE_RANGE.start(),
-                            BONE_RANGE.end()
-                        ),
+                let [least, most] = BONE_RANGE;
+                if length > most || length < least && !may_coincide {
+                    let what = format!(
+                        "is {length:.4} m from {}; a bone of a hand must be {least} to {most} m long, after units and the armature's \
+                         scale",
+                        JOINT_NAMES[start]
                     );
+                    violations.add(joint_name(side, end), what);
                 }
             }
         }
@@ -162,11 +152,9 @@ impl Skeleton {
         let palm = PalmFrame::new(wrist, knuckles);
         let knuckle = |finger: usize| reference.digits[finger + 1].wrist_from_base.position;
         let of_reference = PalmFrame::new(Vec3::ZERO, [0, 1, 2, 3].map(knuckle));
-        if palm.axes.determinant() < 0.5 || palm.breadth < *BONE_RANGE.start() {
-            violations.add(
-                name,
-                "has its knuckles in line with the wrist, so that the palm has no breadth",
-            );
+        if palm.axes.determinant() < 0.5 || palm.breadth < BONE_RANGE[0] {
+            let what = "has its knuckles in line with the wrist, so that the palm has no breadth";
+            violations.add(hand_name(side), what);
             return None;
         }
         let frame_from_wrist = Pose::new(
@@ -201,12 +189,10 @@ impl Skeleton {
             let Neighbours { before, after, share } = neighbours(fingers, finger)?;
             let between = |before: usize, after: usize| joints[before].lerp(joints[after], share);
             let knuckle = between(base_of(before + 1), base_of(after + 1));
-            let metacarpal = between(
-                index::FIRST_OF_DIGIT[before + 1],
-                index::FIRST_OF_DIGIT[after + 1],
-            );
+            let first = |finger: usize| index::FIRST_OF_DIGIT[finger + 1];
+            let metacarpal = between(first(before), first(after));
             joints[joints_of(finger + 1)].fill(knuckle);
-            joints[index::FIRST_OF_DIGIT[finger + 1]] = metacarpal;
+            joints[first(finger)] = metacarpal;
         }
         let skeleton = Self {
             frame_from_wrist,
@@ -215,12 +201,12 @@ impl Skeleton {
             joints,
             has,
         };
-        skeleton.check_shape(name, violations);
+        skeleton.check_shape(side, violations);
         (violations.len() == before).then_some(skeleton)
     }
 
     /// Adds a violation if the thumb is not beside the fingers, or if all digits bend backward.
-    fn check_shape(&self, name: &str, violations: &mut Violations) {
+    fn check_shape(&self, side: Handedness, violations: &mut Violations) {
         let joint = |joint: usize| self.joints[joint];
         let (index_knuckle, little_knuckle) = (joint(base_of(1)), joint(base_of(4)));
         let across = index_knuckle - little_knuckle;
@@ -229,7 +215,7 @@ impl Skeleton {
         let beside = |joint: Vec3| (joint - middle).dot(across) / across.length_squared();
         if beside(joint(thumb - 1)) < THUMB_BESIDE[0] || beside(joint(thumb)) < THUMB_BESIDE[1] {
             violations.add(
-                format!("{name}, {}", JOINT_NAMES[thumb]),
+                joint_name(side, thumb),
                 "is among the fingers or on the little finger's side of the palm; the thumb must be on the index finger's \
                  side (are the fingers' names in order?)",
             );
@@ -246,23 +232,27 @@ impl Skeleton {
         let mean = fingers.clone().map(bend).sum::<f32>() / fingers.count().max(1) as f32;
         if mean < BENT_BACK && joint(thumb + 1).z < 0.0 {
             violations.add(
-                name,
+                hand_name(side),
                 "has fingers that bend backward and a thumb behind the palm, as the other hand would: left and right are \
                  swapped",
             );
         }
     }
 
+    /// The joints, with tips where the skin ends.
+    pub(super) fn joints_with_tips(&self, widths: &Widths) -> [Vec3; JOINT_COUNT] {
+        let mut joints = self.joints;
+        for (tip, end) in index::TIP_OF_DIGIT.into_iter().zip(widths.tips) {
+            joints[tip] = end.unwrap_or(joints[tip]);
+        }
+        joints
+    }
+
     /// The rig with the reference's axes and limits.
     pub(super) fn rig(&self, widths: &Widths, source: &RigSource<'_>) -> Rig {
         let reference = source.reference;
         let radii = self.radii(widths);
-        let mut joints = self.joints;
-        for (digit, &tip) in index::TIP_OF_DIGIT.iter().enumerate() {
-            if let Some(place) = widths.tips[digit] {
-                joints[tip] = place;
-            }
-        }
+        let joints = self.joints_with_tips(widths);
         let digits = std::array::from_fn(|digit| {
             let base = base_of(digit);
             let chain = &reference.digits[digit];
@@ -318,8 +308,7 @@ impl Skeleton {
         rig
     }
 
-    /// The radii of the joints. The knuckle and the metacarpal of a missing finger are as thick as its neighbours', and its other
-    /// joints have no radius.
+    /// The radii of the joints; of a missing finger, those of knuckle and metacarpal are its neighbours', and the others 0.
     fn radii(&self, widths: &Widths) -> [f32; JOINT_COUNT] {
         let mut radii = widths.radii;
         let [_, fingers @ ..] = self.has;
@@ -337,8 +326,7 @@ impl Skeleton {
     }
 }
 
-/// The orientation of a finger's base: the reference's or, if the bone at rest is beyond its sideways limits, turned until it is
-/// at the nearer one, so that widely spread fingers stay apart.
+/// The orientation of a finger's base: the reference's, turned until the bone at rest is within its sideways limits.
 fn within_reach(chain: &DigitRig, limits: &DigitLimits, direction: Vec3) -> Quat {
     let orientation = chain.wrist_from_base.orientation;
     let yaw = yaw_of(chain, direction);

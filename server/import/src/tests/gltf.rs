@@ -2,7 +2,7 @@
 
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 
-use crate::tests::{LIMITS, Ring, assert_mentioned, floats, glb, message, messages, read, volume};
+use crate::tests::{LIMITS, Ring, assert_mentioned, corners, floats, glb, message, messages, read, volume};
 
 const CORNERS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
 const POSITIONS: &str =
@@ -36,14 +36,11 @@ impl Default for Strip<'_> {
 
 impl Strip<'_> {
     fn glb(&self) -> Vec<u8> {
-        let views: Vec<String> = self
-            .views
-            .iter()
-            .map(|(offset, length)| {
-                let stride = self.stride;
-                format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}{stride}}}"#)
-            })
-            .collect();
+        let stride = self.stride;
+        let views = self.views.iter().map(|(offset, length)| {
+            format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}{stride}}}"#)
+        });
+        let views: Vec<String> = views.collect();
         let json = format!(
             r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],
             "meshes":[{{{}"primitives":[{{"attributes":{{"POSITION":0}},{}}}]}}],
@@ -59,21 +56,16 @@ impl Strip<'_> {
 
     /// The area of the mesh in the plane z = 0, signed by its winding.
     fn signed_area(&self) -> f32 {
-        let read = read(self.glb()).unwrap();
-        let areas = (0..read.mesh.triangles().len()).map(|triangle| {
-            let [a, b, c] = read.mesh.corners(triangle);
-            0.5 * (b - a).cross(c - a).z
-        });
-        areas.sum()
+        let triangles = corners(&read(self.glb()).unwrap()).into_iter();
+        triangles.map(|[a, b, c]| 0.5 * (b - a).cross(c - a).z).sum()
     }
 }
 
 #[test]
 fn nodes_place_scale_and_turn_meshes() {
     let ring = Ring::new();
-    let scaled =
-        read(ring.glb(r#","scale":[2,2,2],"rotation":[0.70710677,0,0,0.70710677],"translation":[1,0,0]"#))
-            .unwrap();
+    let place = r#","scale":[2,2,2],"rotation":[0.70710677,0,0,0.70710677],"translation":[1,0,0]"#;
+    let scaled = read(ring.glb(place)).unwrap();
     assert!((volume(&scaled) / (8.0 * Ring::volume()) - 1.0).abs() < 1e-5);
     let thickness = |axis: usize| {
         let along = scaled.mesh.positions().iter().map(|position| position[axis]);
@@ -100,9 +92,9 @@ fn buffers_may_be_data_urls_but_no_files() {
     let uri = format!(r#","uri":"data:application/octet-stream;base64,{encoded}""#);
     let inside = read(ring.gltf_json("", &uri)).unwrap();
     assert!((volume(&inside) / Ring::volume() - 1.0).abs() < 1e-5);
-    let outside = ring.gltf_json("", r#","uri":"ring.bin""#);
+    let outside = message(ring.gltf_json("", r#","uri":"ring.bin""#));
     assert_eq!(
-        message(&outside),
+        outside,
         "buffers[0]: is in another file; embed the buffers, or send a GLB"
     );
 }
@@ -205,33 +197,41 @@ fn what_cannot_be_read_is_named() {
     let ring = Ring::new();
     let json = ring.gltf_json("", "");
     let required = |extension: &str| {
-        let more =
-            format!(r#""extensionsUsed":["{extension}"],"extensionsRequired":["{extension}"],"asset""#);
-        glb(&json.replace(r#""asset""#, &more), &ring.buffer())
+        format!(r#""extensionsUsed":["{extension}"],"extensionsRequired":["{extension}"],"asset""#)
     };
-    let changed = |from: &str, to: &str| glb(&json.replace(from, to), &ring.buffer());
-    for (bytes, expected) in [
-        (required("KHR_draco_mesh_compression"), "compressed by Draco"),
-        (required("EXT_meshopt_compression"), "compressed by meshopt"),
-        (required("ACME_secret"), "extension \"ACME_secret\": is required"),
+    let [draco, meshopt, secret] = [
+        "KHR_draco_mesh_compression",
+        "EXT_meshopt_compression",
+        "ACME_secret",
+    ]
+    .map(required);
+    for (from, to, expected) in [
+        (r#""asset""#, draco.as_str(), "compressed by Draco"),
+        (r#""asset""#, meshopt.as_str(), "compressed by meshopt"),
         (
-            changed(r#""count":576"#, r#""count":577"#),
-            "reach beyond its buffer",
+            r#""asset""#,
+            secret.as_str(),
+            "extension \"ACME_secret\": is required",
         ),
+        ("576", "577", "reach beyond its buffer"),
+        ("576", "4294967295", "4294967295 vertices; at most 300000"),
+        ("576", "9", "indices: vertex"),
         (
-            changed(r#""count":576"#, r#""count":4294967295"#),
-            "4294967295 vertices; at most 300000",
-        ),
-        (changed(r#""count":576"#, r#""count":9"#), "indices: vertex"),
-        (
-            changed(r#""indices":1"#, r#""indices":7"#),
+            r#""indices":1"#,
+            r#""indices":7"#,
             "refers to something that does not exist",
         ),
         (
-            changed(r#""byteOffset":0"#, r#""byteOffset":18446744073709551610"#),
+            r#"Offset":0"#,
+            r#"Offset":18446744073709551610"#,
             "reach beyond its buffer",
         ),
-        (changed(r#""POSITION":0"#, r#""NORMAL":0"#), "is missing"),
+        (r#""POSITION":0"#, r#""NORMAL":0"#, "is missing"),
+    ] {
+        let changed = glb(&json.replace(from, to), &ring.buffer());
+        assert_mentioned(&messages(read(changed)), &[expected]);
+    }
+    for (bytes, expected) in [
         (glb(&json, &[0; 8]), "claims 20736 bytes and has 8"),
         (ring.glb("")[..500].to_vec(), "it is cut off or damaged"),
         (b"glTF\x02\0\0\0\x05\0\0\0".to_vec(), "claims 5 bytes"),
@@ -276,10 +276,8 @@ fn scenes_that_repeat_themselves_end() {
         "bufferViews":[{"buffer":0,"byteLength":64}],"buffers":[{"byteLength":64}]}"#;
     assert!(message(glb(joints, &[0; 64])).contains("has no triangles"));
     // Each takes a hundred times its two bytes.
-    let nodes = format!(
-        r#"{{"asset":{{"version":"2.0"}},"nodes":[{}]}}"#,
-        many(200_000, "{}")
-    );
+    let nodes = many(200_000, "{}");
+    let nodes = format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}]}}"#);
     assert!(message(&nodes).contains("200002 JSON objects; at most 100000"));
 }
 

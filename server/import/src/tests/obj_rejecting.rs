@@ -1,5 +1,7 @@
 //! OBJ text that is rejected, bytes that are no mesh, and properties of any input.
 
+use std::collections::HashSet;
+
 use crate::{
     Import, ImportError, ImportedMesh, MeshLimits, read_mesh,
     tests::{CUBE, LIMITS, assert_mentioned, message, messages, read, reference},
@@ -19,10 +21,9 @@ fn text_without_triangles_is_told_from_none() {
             "{text:?}"
         );
     }
-    let empty = |dropped, unknown| vec![ImportError::Empty { dropped, unknown }];
-    assert_eq!(read("v 0 0 0\n").unwrap_err(), empty(0, 0));
     let text = "v 0 0 0\nv 1 0 0\nv 2 0 0\np 1\nf 1 2\nf 1 2 3\ncurv 0 1\n";
-    assert_eq!(read(text).unwrap_err(), empty(3, 1));
+    let expected = "the mesh has no triangles; 3 points, lines and faces without area and 1 lines with an unknown keyword were ignored";
+    assert_eq!(message(text), expected);
 }
 
 #[test]
@@ -85,45 +86,26 @@ fn limits_are_kept_exactly() {
         vertices: 8,
         triangles: 12,
     };
-    assert!(read_mesh(CUBE.as_bytes(), Import::METRES, limits).is_ok());
+    let read = |import, limits| read_mesh(CUBE.as_bytes(), import, limits);
+    assert!(read(Import::METRES, limits).is_ok());
+    let [mut small, mut sparse, mut coarse] = [limits; 3];
+    small.bytes -= 1;
+    sparse.vertices -= 1;
+    coarse.triangles -= 1;
+    let bytes = format!(
+        "the file has {} bytes; at most {} are allowed",
+        limits.bytes, small.bytes
+    );
     for (limits, expected) in [
-        (
-            MeshLimits {
-                bytes: CUBE.len() - 1,
-                ..limits
-            },
-            format!(
-                "the file has {} bytes; at most {} are allowed",
-                CUBE.len(),
-                CUBE.len() - 1
-            ),
-        ),
-        (
-            MeshLimits {
-                vertices: 7,
-                ..limits
-            },
-            "line 8: the mesh has more than 7 vertices".to_owned(),
-        ),
-        (
-            MeshLimits {
-                triangles: 11,
-                ..limits
-            },
-            "line 14: the mesh has more than 11 triangles".to_owned(),
-        ),
+        (small, bytes.as_str()),
+        (sparse, "line 8: the mesh has more than 7 vertices"),
+        (coarse, "line 14: the mesh has more than 11 triangles"),
     ] {
-        assert_eq!(
-            messages(read_mesh(CUBE.as_bytes(), Import::METRES, limits)),
-            [expected]
-        );
+        assert_eq!(messages(read(Import::METRES, limits)), [expected]);
     }
     for unit in [0.0, -1.0, f32::INFINITY, f32::NAN] {
         let expected = format!("a unit of {unit} m cannot be used; it must be finite and more than 0");
-        assert_eq!(
-            messages(read_mesh(CUBE.as_bytes(), Import::with_unit(unit), LIMITS)),
-            [expected]
-        );
+        assert_eq!(messages(read(Import::with_unit(unit), LIMITS)), [expected]);
     }
 }
 
@@ -134,25 +116,19 @@ fn concave_polygons_of_too_many_corners_are_refused() {
         let face: Vec<_> = (1..=corners).map(|k| k.to_string()).collect();
         format!("{}f {}\n", teeth.collect::<String>(), face.join(" "))
     };
-    assert_eq!(
-        message(text(10_001)),
-        "on line 10002: a polygon that is not convex has 10001 corners; at most 10000 are allowed, split it into triangles"
-    );
+    let expected = "on line 10002: a polygon that is not convex has 10001 corners; at most 10000 are allowed, split it into triangles";
+    assert_eq!(message(text(10_001)), expected);
 }
 
 #[test]
 fn bytes_that_are_no_mesh_are_named() {
     let page = "\u{feff}<html><body>404</body></html>";
     let page: Vec<u8> = page.encode_utf16().flat_map(u16::to_le_bytes).collect();
-    let picture = [
-        &b"\x89PNG\r\n\x1a\n"[..],
-        &b"\x01\x02\nIDAT\n\x03".repeat(10),
-        b"\nf \xFF\xFE\x01\nv\n",
-    ]
-    .concat();
+    let data = b"\x01\x02\nIDAT\n\x03".repeat(10);
+    let picture = [&b"\x89PNG\r\n\x1a\n"[..], &data, b"\nf \xFF\xFE\x01\nv\n"].concat();
     let cases: [(&[u8], &str); 15] = [
         (
-            b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n",
+            b"version https://git-lfs\noid sha256:4d7a\nsize 123\n",
             "a Git LFS pointer",
         ),
         (b"\n [1, 2, 3]", "JSON"),
@@ -160,10 +136,7 @@ fn bytes_that_are_no_mesh_are_named() {
         (b"Kaydara FBX Binary  \0\x1a\0", "FBX"),
         (b"<!DOCTYPE html><html><body>404 Not found</body></html>", "HTML"),
         (b"\xEF\xBB\xBF<HTML>\n<BODY>Sign in</BODY>", "HTML"),
-        (
-            b"<?xml version=\"1.0\"?>\n<COLLADA version=\"1.4.1\"></COLLADA>",
-            "COLLADA",
-        ),
+        (b"<?xml version=\"1.0\"?>\n<COLLADA></COLLADA>", "COLLADA"),
         (b"PK\x03\x04\x14\0\0\0\x08\0mesh.obj", "ZIP"),
         (b"\xFF\xFE\0\0v\0\0\0", "UTF-32"),
         (b"newmtl steel\nKd 1 1 1\n", "material library"),
@@ -215,15 +188,15 @@ fn assert_sound(read: &ImportedMesh, limits: MeshLimits) {
     assert!(read.indices_in_file.is_sorted_by(|a, b| a < b));
     assert!((read.indices_in_file[triangles - 1] as usize) < read.triangles_in_file);
     assert!(read.triangles_in_file <= limits.triangles);
-    let mut bits: Vec<_> = read
-        .mesh
-        .positions()
-        .iter()
+    let positions = read.mesh.positions().iter();
+    let different: HashSet<_> = positions
         .map(|position| position.to_array().map(f32::to_bits))
         .collect();
-    bits.sort_unstable();
-    bits.dedup();
-    assert_eq!(bits.len(), read.mesh.positions().len(), "positions are welded");
+    assert_eq!(
+        different.len(),
+        read.mesh.positions().len(),
+        "positions are welded"
+    );
     assert!(read.groups.is_sorted_by(|(a, _), (b, _)| a < b));
     for (name, members) in &read.groups {
         assert!(!name.is_empty() && !members.is_empty());
@@ -272,11 +245,9 @@ fn well_formed() -> impl Strategy<Value = String> {
     ];
     let line = prop_oneof![
         4 => (corners, any::<bool>()).prop_map(|(corners, backward)| {
-            let corners: Vec<_> = corners
-                .into_iter()
-                .map(|corner| (if backward { corner - 21 } else { corner }).to_string())
-                .collect();
-            format!("f {}", corners.join(" "))
+            let offset = if backward { 21 } else { 0 };
+            let corners = corners.into_iter().map(|corner| format!(" {}", corner - offset));
+            format!("f{}", corners.collect::<String>())
         }),
         1 => name().prop_map(|name| format!("g {name}")),
         1 => (name(), name()).prop_map(|(a, b)| format!("g {a} {b}")),

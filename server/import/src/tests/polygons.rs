@@ -1,6 +1,5 @@
 //! Polygons are covered once by their triangles, wherever they lie and whatever their shape.
 
-use crate::{Import, ImportedMesh, read_mesh};
 use glam::{DVec2, DVec3, Quat, Vec3};
 use proptest::{
     collection::vec,
@@ -8,34 +7,13 @@ use proptest::{
     test_runner::{RngAlgorithm, RngSeed},
 };
 
-use crate::tests::{LIMITS, read};
+use crate::{
+    ImportedMesh,
+    tests::{corners, read, repair::Polygons},
+};
 
 /// Largest error of an area relative to the square of the mesh's extent: rounding of positions to `f32`.
 const AREA_ERROR: f64 = 1e-5;
-
-/// The vertices of well-formed text, and its faces as indices of these.
-fn parsed(text: &str) -> (Vec<DVec3>, Vec<Vec<usize>>) {
-    let text = text.replace("\\\r\n", " ").replace("\\\n", " ");
-    let numbers = |keyword: &'static str| {
-        text.lines()
-            .filter_map(move |line| line.trim().strip_prefix(keyword))
-            .map(str::split_whitespace)
-    };
-    let vertices = numbers("v ")
-        .map(|words| {
-            let n: Vec<f32> = words.map(|word| word.parse().unwrap()).collect();
-            Vec3::new(n[0], n[1], n[2]).as_dvec3()
-        })
-        .collect();
-    let faces = numbers("f ")
-        .map(|words| {
-            words
-                .map(|word| word.split('/').next().unwrap().parse::<usize>().unwrap() - 1)
-                .collect()
-        })
-        .collect();
-    (vertices, faces)
-}
 
 /// Twice the area of a polygon as a vector along its normal, by the shoelace formula.
 fn shoelace(corners: &[DVec3]) -> DVec3 {
@@ -46,14 +24,13 @@ fn shoelace(corners: &[DVec3]) -> DVec3 {
 
 /// Asserts that the triangles of each face have the face's winding, and together its area. A polygon that folds over
 /// itself has triangles of both windings, or more area.
-fn assert_areas_match(text: &str, read: &ImportedMesh) {
-    let (vertices, faces) = parsed(text);
-    let extent = vertices.iter().map(|vertex| vertex.length()).fold(0.0, f64::max);
+fn assert_areas_match(polygons: &Polygons, read: &ImportedMesh) {
+    let vertices = polygons.0.iter().flatten();
+    let extent = vertices.map(|vertex| vertex.length()).fold(0.0, f64::max);
     let tolerance = AREA_ERROR * extent * extent;
     let mut first = 0;
-    for (number, face) in faces.iter().enumerate() {
-        let corners: Vec<_> = face.iter().map(|&vertex| vertices[vertex]).collect();
-        let expected = shoelace(&corners);
+    for (number, face) in polygons.0.iter().enumerate() {
+        let expected = shoelace(face);
         let normal = expected.normalize_or(DVec3::Z);
         let last = first + face.len() - 2;
         let mut area = 0.0;
@@ -69,11 +46,10 @@ fn assert_areas_match(text: &str, read: &ImportedMesh) {
             );
             area += twice;
         }
-        let difference = area - expected.length();
+        let expected = expected.length();
         assert!(
-            difference.abs() <= tolerance,
-            "face {number}: {area}, not {}",
-            expected.length()
+            (area - expected).abs() <= tolerance,
+            "face {number}: {area}, not {expected}"
         );
         first = last;
     }
@@ -82,17 +58,16 @@ fn assert_areas_match(text: &str, read: &ImportedMesh) {
 
 /// Asserts that no triangle reaches out of the polygon: that points of each lie inside.
 fn assert_inside(outline: &[DVec2], plane: Plane, read: &ImportedMesh) {
-    for triangle in 0..read.mesh.triangles().len() {
-        let [a, b, c] = read.mesh.corners(triangle).map(|corner| plane.flatten(corner));
+    for triangle in corners(read) {
+        let [a, b, c] = triangle.map(|corner| plane.flatten(corner));
         for weights in [[1.0, 1.0, 1.0], [8.0, 1.0, 1.0], [1.0, 8.0, 1.0], [1.0, 1.0, 8.0]] {
             let [u, v, w] = weights;
             let point = (a * u + b * v + c * w) / (u + v + w);
-            let distance = (0..outline.len())
-                .map(|k| distance(point, outline[k], outline[(k + 1) % outline.len()]))
-                .fold(f64::INFINITY, f64::min);
+            let distances = sides(outline).map(|(a, b)| distance(point, a, b));
+            let distance = distances.fold(f64::INFINITY, f64::min);
             assert!(
                 distance < 1e-5 || is_inside(outline, point),
-                "{point} of triangle {triangle} is {distance} outside of {outline:?}"
+                "{point} of {triangle:?} is {distance} outside of {outline:?}"
             );
         }
     }
@@ -103,16 +78,17 @@ fn distance(point: DVec2, a: DVec2, b: DVec2) -> f64 {
     point.distance(a + (b - a) * along)
 }
 
+fn sides(outline: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> {
+    let ends = outline.iter().copied().cycle().skip(1);
+    outline.iter().copied().zip(ends)
+}
+
 /// Whether a ray from the point crosses the outline an odd number of times.
 fn is_inside(outline: &[DVec2], point: DVec2) -> bool {
-    (0..outline.len())
-        .filter(|&k| {
-            let (a, b) = (outline[k], outline[(k + 1) % outline.len()]);
-            (a.y > point.y) != (b.y > point.y) && point.x < a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x)
-        })
-        .count()
-        % 2
-        == 1
+    let crossed = sides(outline).filter(|(a, b)| {
+        (a.y > point.y) != (b.y > point.y) && point.x < a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x)
+    });
+    crossed.count() % 2 == 1
 }
 
 /// A plane in space.
@@ -124,51 +100,44 @@ struct Plane {
 
 impl Plane {
     fn any() -> impl Strategy<Value = Self> {
-        let number = || -1.0_f32..1.0;
-        (
-            [number(), number(), number()],
-            0.0_f32..6.3,
-            [number(), number(), number()],
-        )
-            .prop_map(|(axis, angle, origin)| Self {
-                orientation: Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle),
-                origin: Vec3::from(origin),
-            })
+        let vector = || [-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0];
+        (vector(), 0.0_f32..6.3, vector()).prop_map(|(axis, angle, origin)| Self {
+            orientation: Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle),
+            origin: Vec3::from(origin),
+        })
     }
+
+    /// The plane z = 0.
+    const FLAT: Self = Self {
+        orientation: Quat::IDENTITY,
+        origin: Vec3::ZERO,
+    };
 
     fn lift(self, point: DVec2) -> Vec3 {
         self.orientation * point.extend(0.0).as_vec3() + self.origin
     }
 
     fn flatten(self, point: Vec3) -> DVec2 {
-        (self.orientation.inverse() * (point - self.origin))
-            .as_dvec3()
-            .truncate()
+        let local = self.orientation.inverse() * (point - self.origin);
+        local.as_dvec3().truncate()
     }
 }
 
-/// Text of one polygon, in a plane.
-fn text_of(outline: &[DVec2], plane: Plane) -> String {
-    let vertices: Vec<_> = outline
-        .iter()
-        .map(|&point| {
-            let [x, y, z] = plane.lift(point).to_array();
-            format!("v {x} {y} {z}\n")
-        })
-        .collect();
-    let face: Vec<_> = (1..=outline.len()).map(|k| k.to_string()).collect();
-    format!("{}f {}\n", vertices.concat(), face.join(" "))
+/// One polygon in a plane, of vertices in single precision.
+fn polygon(outline: &[DVec2], plane: Plane) -> Polygons {
+    let corners = outline.iter().map(|&point| plane.lift(point).as_dvec3());
+    Polygons(vec![corners.collect()])
+}
+
+fn is_crossed(read: &ImportedMesh) -> bool {
+    read.warnings.iter().any(|warning| warning.contains("intersect"))
 }
 
 fn assert_areas_covered(outline: &[DVec2], plane: Plane) -> ImportedMesh {
-    let text = text_of(outline, plane);
-    let read = read(&text).unwrap();
-    assert!(
-        !read.warnings.iter().any(|warning| warning.contains("intersect")),
-        "{:?}",
-        read.warnings
-    );
-    assert_areas_match(&text, &read);
+    let polygon = polygon(outline, plane);
+    let read = read(polygon.obj()).unwrap();
+    assert!(!is_crossed(&read), "{:?}", read.warnings);
+    assert_areas_match(&polygon, &read);
     read
 }
 
@@ -285,36 +254,9 @@ proptest! {
         // Exact coordinates: corners are exactly collinear, and sides touch or coincide.
         let snapped: Vec<_> = outline.iter().map(|point| (point * 4.0).round()).collect();
         let snapped = with_more_corners(&snapped, &extra);
-        let text = text_of(&snapped, Plane { orientation: Quat::IDENTITY, origin: Vec3::ZERO });
-        if let Ok(read) = read_mesh(text.as_bytes(), Import::METRES, LIMITS)
-            && !read.warnings.iter().any(|warning| warning.contains("intersect"))
-        {
-            assert_areas_match(&text, &read);
-        }
-    }
-}
-
-#[test]
-fn convex_polygons_are_fans_from_their_first_corner() {
-    for corners in [4, 5, 17, 300] {
-        let circle: Vec<_> = (0..corners)
-            .map(|k| DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(corners)))
-            .collect();
-        for start in 0..4 {
-            let mut turned = circle.clone();
-            turned.rotate_left(start);
-            let plane = Plane {
-                orientation: Quat::from_xyzw(0.1, 0.7, -0.1, 0.7).normalize(),
-                origin: Vec3::new(0.3, 5.0, -1.0),
-            };
-            let read = read(text_of(&turned, plane)).unwrap();
-            let fan: Vec<_> = (2..corners as usize).map(|k| [0, k - 1, k]).collect();
-            let fan: Vec<_> = fan
-                .iter()
-                .map(|triangle| triangle.map(|k| plane.lift(turned[k])))
-                .collect();
-            let triangles: Vec<_> = (0..fan.len()).map(|t| read.mesh.corners(t)).collect();
-            assert_eq!(triangles, fan);
+        let polygon = polygon(&snapped, Plane::FLAT);
+        if let Ok(read) = read(polygon.obj()) && !is_crossed(&read) {
+            assert_areas_match(&polygon, &read);
         }
     }
 }
@@ -322,71 +264,77 @@ fn convex_polygons_are_fans_from_their_first_corner() {
 #[test]
 fn corners_on_straight_sides_stay_joined_to_the_neighbouring_face() {
     // Two concave faces share a straight side with a corner that both have.
-    let text = "v 0 0 0\nv 2 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nv 4 -4 0\nv 2 -1 0\nv 0 -4 0
-f 1 2 3 4 5 6\nf 3 2 1 9 8 7\n";
-    let read = read(text).unwrap();
-    assert_areas_match(text, &read);
-    assert_eq!(
-        read.warnings,
-        [
-            "8 edges are open: the surface has holes and its volume is an estimate; the first is at the face on line 10"
-        ]
-    );
+    let [upper, lower] = [
+        [(0, 0), (2, 0), (4, 0), (4, 4), (2, 1), (0, 4)],
+        [(4, 0), (2, 0), (0, 0), (0, -4), (2, -1), (4, -4)],
+    ]
+    .map(|corners| {
+        corners
+            .map(|(x, y): (i32, i32)| DVec3::new(x.into(), y.into(), 0.0))
+            .to_vec()
+    });
+    let polygons = Polygons(vec![upper, lower]);
+    let read = read(polygons.obj()).unwrap();
+    assert_areas_match(&polygons, &read);
+    let open = "8 edges are open: the surface has holes and its volume is an estimate; the first is at the face on line 7";
+    assert_eq!(read.warnings, [open]);
 }
 
 #[test]
-fn covers_a_spiral_and_a_comb_of_thousands_of_corners() {
-    let plane = Plane {
-        orientation: Quat::from_rotation_x(0.4),
-        origin: Vec3::new(0.1, 0.2, 0.3),
-    };
+fn covers_a_spiral_of_thousands_of_corners() {
     let turns = |k: u32, inner: f64| {
         let angle = f64::from(k) * 0.05;
         DVec2::from_angle(angle) * (0.1 + 0.01 * angle + inner)
     };
-    let spiral: Vec<_> = (0..1500)
-        .map(|k| turns(k, 0.03))
-        .chain((0..1500).rev().map(|k| turns(k, 0.0)))
-        .collect();
+    let outer = (0..1500).map(|k| turns(k, 0.03));
+    let spiral: Vec<_> = outer.chain((0..1500).rev().map(|k| turns(k, 0.0))).collect();
+    let plane = Plane {
+        orientation: Quat::from_rotation_x(0.4),
+        origin: Vec3::new(0.1, 0.2, 0.3),
+    };
     assert_areas_covered(&spiral, plane);
-    let comb: Vec<_> = std::iter::once(DVec2::new(0.0, -0.1))
-        .chain(std::iter::once(DVec2::new(3.0, -0.1)))
-        .chain(
-            (0..3000_u32)
-                .rev()
-                .map(|k| DVec2::new(f64::from(k) * 1e-3, f64::from(k % 2))),
-        )
-        .collect();
-    assert_areas_covered(&comb, plane);
 }
 
 #[test]
 fn warped_polygon_is_covered_as_seen_along_its_normal() {
-    let outline = [
-        (0.0, 0.0),
-        (4.0, 0.0),
-        (4.0, 1.0),
-        (1.0, 1.0),
-        (1.0, 4.0),
-        (0.0, 4.0),
-    ];
+    let outline = [(0, 0), (4, 0), (4, 1), (1, 1), (1, 4), (0, 4)]
+        .map(|(x, y): (i32, i32)| DVec2::new(x.into(), y.into()));
     for start in 0..outline.len() {
         let mut turned = outline;
         turned.rotate_left(start);
-        let vertices: Vec<_> = turned
-            .iter()
-            .map(|&(x, y)| format!("v {x} {y} {}\n", 0.02 * x * y - 0.01 * x * x))
-            .collect();
-        let read = read(format!("{}f 1 2 3 4 5 6\n", vertices.concat())).unwrap();
-        let area: f64 = (0..read.mesh.triangles().len())
-            .map(|triangle| {
-                let [a, b, c] = read.mesh.corners(triangle).map(Vec3::as_dvec3);
-                let twice = (b - a).cross(c - a);
-                assert!(twice.z > 0.0, "{start}");
-                twice.z / 2.0
-            })
-            .sum();
-        assert!((area - 7.0).abs() < 1e-5, "{start}: {area}");
+        let warped = turned.map(|point| point.extend(0.02 * point.x * point.y - 0.01 * point.x * point.x));
+        let read = read(Polygons(vec![warped.to_vec()]).obj()).unwrap();
+        let areas = corners(&read)
+            .into_iter()
+            .map(|[a, b, c]| (b - a).cross(c - a).z / 2.0);
+        let areas: Vec<f32> = areas.collect();
+        assert!(areas.iter().all(|&area| area > 0.0), "{start}: {areas:?}");
+        assert!(
+            (areas.iter().sum::<f32>() - 7.0).abs() < 1e-5,
+            "{start}: {areas:?}"
+        );
+    }
+}
+
+#[test]
+fn spikes_and_repeated_corners_have_no_area() {
+    // An L whose corners repeat, with a spike of no width at its end.
+    let outline = [
+        (0, 0),
+        (2, 0),
+        (5, 0),
+        (2, 0),
+        (2, 1),
+        (2, 1),
+        (1, 1),
+        (1, 2),
+        (0, 2),
+    ];
+    for start in 0..outline.len() {
+        let mut turned = outline.map(|(x, y): (i32, i32)| DVec2::new(x.into(), y.into()));
+        turned.rotate_left(start);
+        let read = assert_areas_covered(&turned, Plane::FLAT);
+        assert_eq!(read.mesh.area(), 3.0, "{start}");
     }
 }
 
@@ -396,18 +344,9 @@ fn polygons_that_intersect_themselves_stay_fans_with_a_warning() {
     let bow_tie = [(0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.0)].map(DVec2::from);
     let star: [DVec2; 5] = std::array::from_fn(|k| DVec2::from_angle(0.8 * std::f64::consts::PI * k as f64));
     for crossed in [&uneven_bow_tie[..], &bow_tie, &star] {
-        let found = read(text_of(
-            crossed,
-            Plane {
-                orientation: Quat::IDENTITY,
-                origin: Vec3::ZERO,
-            },
-        ))
-        .unwrap();
-        for triangle in 0..crossed.len() - 2 {
-            let fan = [0, triangle + 1, triangle + 2].map(|k| crossed[k].extend(0.0).as_vec3());
-            assert_eq!(found.mesh.corners(triangle), fan);
-        }
+        let found = read(polygon(crossed, Plane::FLAT).obj()).unwrap();
+        let fan = (2..crossed.len()).map(|k| [0, k - 1, k].map(|k| Plane::FLAT.lift(crossed[k])));
+        assert_eq!(corners(&found), fan.collect::<Vec<_>>());
         let texts = "1 polygons intersect themselves; their fans of triangles overlap; the first is on line ";
         assert!(found.warnings[0].starts_with(texts), "{:?}", found.warnings);
     }

@@ -4,7 +4,10 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use glam::{DVec3, Vec3};
 
-use crate::{Import, read_mesh, tests::LIMITS};
+use crate::{
+    Import, read_mesh,
+    tests::{LIMITS, corners},
+};
 
 /// Triangles by position in file order, and the triangles of each name.
 #[derive(Debug, Default, PartialEq)]
@@ -23,12 +26,12 @@ pub(crate) fn read(text: &str, unit_metres: f32, origin_in_file: DVec3) -> Refer
         .lines()
         .filter_map(|line| line.trim().strip_prefix("v "))
         .map(|numbers| {
-            let n: Vec<f64> = numbers
+            let numbers = numbers
                 .split_whitespace()
                 .take(3)
-                .map(|number| number.parse().unwrap())
-                .collect();
-            ((DVec3::new(n[0], n[1], n[2]) - origin_in_file) * f64::from(unit_metres)).as_vec3()
+                .map(|number| number.parse().unwrap());
+            let position = DVec3::from_slice(&numbers.collect::<Vec<f64>>());
+            ((position - origin_in_file) * f64::from(unit_metres)).as_vec3()
         })
         .collect();
     let mut reference = Reference::default();
@@ -40,11 +43,10 @@ pub(crate) fn read(text: &str, unit_metres: f32, origin_in_file: DVec3) -> Refer
         let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
         let whole = || {
-            if rest.is_empty() {
-                vec![]
-            } else {
-                vec![rest.to_owned()]
-            }
+            (!rest.is_empty())
+                .then(|| rest.to_owned())
+                .into_iter()
+                .collect::<Vec<_>>()
         };
         match keyword {
             "v" => before += 1,
@@ -82,11 +84,8 @@ pub(crate) fn read(text: &str, unit_metres: f32, origin_in_file: DVec3) -> Refer
                     }
                     let names: BTreeSet<&String> = group.iter().chain(&object).chain(&material).collect();
                     for name in names {
-                        reference
-                            .groups
-                            .entry(name.clone())
-                            .or_default()
-                            .push(reference.triangles.len() as u32);
+                        let triangles = reference.groups.entry(name.clone()).or_default();
+                        triangles.push(reference.triangles.len() as u32);
                     }
                     reference.triangles.push(triangle);
                 }
@@ -102,9 +101,7 @@ pub(crate) fn compare(text: &str, unit_metres: f32) {
     let real = read_mesh(text.as_bytes(), Import::with_unit(unit_metres), LIMITS).unwrap();
     let reference = read(text, unit_metres, real.origin_in_file);
     let turned = real.warnings.iter().any(|warning| warning.contains("turned"));
-    let triangles: Vec<[Vec3; 3]> = (0..real.mesh.triangles().len())
-        .map(|triangle| real.mesh.corners(triangle))
-        .collect();
+    let triangles = corners(&real);
     if reference.has_concave {
         let is_repaired = |warning: &String| warning.contains("opposite winding");
         if turned || real.warnings.iter().any(is_repaired) {

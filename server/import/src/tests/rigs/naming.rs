@@ -1,14 +1,17 @@
 //! Which nodes are which joints: by names, by number, by VRM.
 
 use crate::{
-    MappedJoint, rig_at_rest,
+    MappedJoint, read_rig, rig_at_rest,
     tests::{
         LIMITS, assert_mentioned, messages,
-        rigs::{Name, adult, adult_at_rest, differences, edited, model, named, read, source},
+        rigs::{
+            Name, adult, adult_at_rest, assert_is_adult, edited, joints_of, model, named, read, read_style,
+            source,
+        },
     },
 };
 use grasp_characters::{
-    Character, Style,
+    Style,
     names::{
         auto_rig, biped, blender, bone, leap, mano, mixamo, numbered_from_palm, numbered_to_end, quest,
         steam, unity, unreal, vrm_0, vrm_1, vroid, webxr,
@@ -44,28 +47,97 @@ fn characters_of_the_usual_engines_give_the_rig_of_their_hands() {
         ("vrm 1.0", vrm(vrm_1)),
         ("flat", flat),
     ] {
-        let rig = read(&Character::new(&style).glb).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
+        let rig = read_style(&style).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
+        assert_is_adult(&rig, [2e-3, 1e-3, 0.2], what);
         for hand in [&rig.left, &rig.right] {
-            differences(&hand.rig, adult(hand.rig.handedness)).assert_below([2e-3, 1e-3, 0.2], what);
             assert!(!hand.is_mirrored && hand.binding.is_some());
         }
     }
 }
 
+/// The bones of a VRM extension: a jaw without a node.
+fn with_jaw_of_0(names: &[String]) -> Value {
+    let mut extensions = vrm_0(names);
+    let bones = extensions["VRM"]["humanoid"]["humanBones"]
+        .as_array_mut()
+        .unwrap();
+    bones.insert(0, json!({ "bone": "jaw", "node": -1 }));
+    extensions
+}
+
+fn with_jaw_of_1(names: &[String]) -> Value {
+    let mut extensions = vrm_1(names);
+    extensions["VRMC_vrm"]["humanoid"]["humanBones"]["jaw"] = Value::Null;
+    extensions
+}
+
+/// Thumbs of drafts of VRM 1.0, which have the names of a finger.
+fn draft(names: &[String]) -> Value {
+    let mut extensions = vrm_1(names);
+    let bones = extensions["VRMC_vrm"]["humanoid"]["humanBones"]
+        .as_object_mut()
+        .unwrap();
+    for side in ["left", "right"] {
+        let [first, second] =
+            ["Metacarpal", "Proximal"].map(|bone| bones.remove(&format!("{side}Thumb{bone}")).unwrap());
+        bones.insert(format!("{side}ThumbProximal"), first);
+        bones.insert(format!("{side}ThumbIntermediate"), second);
+    }
+    extensions
+}
+
+/// An extension that names the hands and two bones of the index fingers.
+fn without_distal(names: &[String]) -> Value {
+    let node = |name: String| names.iter().position(|other| *other == name).unwrap();
+    let mut bones = Vec::new();
+    for (side, letter) in [("left", 'L'), ("right", 'R')] {
+        for (bone, name) in [
+            ("Hand", "Hand"),
+            ("IndexProximal", "Index1"),
+            ("IndexIntermediate", "Index2"),
+        ] {
+            bones.push(
+                json!({ "bone": format!("{side}{bone}"), "node": node(format!("J_Bip_{letter}_{name}")) }),
+            );
+        }
+    }
+    json!({ "VRM": { "humanoid": { "humanBones": bones } } })
+}
+
 #[test]
-fn numbers_count_the_bones_that_are_there() {
-    let programs: [(&str, Name); 8] = [
-        ("four bones from the palm", numbered_from_palm),
-        ("five bones from the palm", numbered_to_end),
-        ("Auto-Rig Pro", auto_rig),
-        ("Blender", blender),
-        ("SteamVR", steam),
-        ("Ultraleap", leap),
-        ("Biped", biped),
-        ("VRoid", vroid),
+fn numbers_and_extensions_that_leave_out_bones_give_the_same_rig() {
+    let none = Style::PLAIN.extensions;
+    let programs: [(&str, Name, fn(&[String]) -> Value); 13] = [
+        ("four bones from the palm", numbered_from_palm, none),
+        ("five bones from the palm", numbered_to_end, none),
+        ("Auto-Rig Pro", auto_rig, none),
+        ("Blender", blender, none),
+        ("SteamVR", steam, none),
+        ("Ultraleap", leap, none),
+        ("Biped", biped, none),
+        ("VRoid", vroid, none),
+        ("bones without a node in 0.x", bone, with_jaw_of_0),
+        ("bones without a node in 1.0", bone, with_jaw_of_1),
+        ("draft", bone, draft),
+        ("without the last bone", vroid, without_distal),
+        (
+            "broken",
+            vroid,
+            |_| json!({ "VRM": { "humanoid": { "humanBones": 3 } } }),
+        ),
     ];
-    for (what, name) in programs {
-        assert_is_adult(what, &model(name));
+    for (what, name, extensions) in programs {
+        let style = Style {
+            extensions,
+            ..named(name)
+        };
+        let rig = read_style(&style).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
+        assert_is_adult(&rig, [2e-3, 1.0, 1.0], what);
+        let is_told = rig
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("VRM extension cannot be read"));
+        assert_eq!(is_told, what == "broken", "{:?}", rig.warnings);
     }
 }
 
@@ -115,8 +187,8 @@ fn a_map_names_joints_that_names_do_not() {
             })
         })
         .collect();
-    let rig = crate::read_rig(&glb, source(&map), LIMITS).unwrap();
-    differences(&rig.left.rig, adult(Handedness::Left)).assert_below([2e-3, 1.0, 1.0], "mapped");
+    let rig = read_rig(&glb, source(&map), LIMITS).unwrap();
+    assert_is_adult(&rig, [2e-3, 1.0, 1.0], "mapped");
 }
 
 #[test]
@@ -125,7 +197,7 @@ fn the_other_hand_is_mirrored_if_only_one_is_shown() {
         sides: &[Handedness::Left],
         ..named(mixamo)
     };
-    let rig = read(&Character::new(&style).glb).unwrap();
+    let rig = read_style(&style).unwrap();
     assert!(rig.right.is_mirrored && rig.right.binding.is_none());
     assert_eq!(rig.right.rig, rig.left.rig.mirrored());
 }
@@ -148,18 +220,14 @@ fn hands_keep_the_fingers_that_they_have() {
                 fingers,
                 ..named(name)
             };
-            let imported = read(&Character::new(&style).glb).unwrap();
+            let imported = read_style(&style).unwrap();
             for hand in [&imported.left, &imported.right] {
                 let (rig, adult) = (&hand.rig, adult(hand.rig.handedness));
                 assert!(rig.fingers().eq(fingers.iter().copied()), "{fingers:?}");
                 assert!(rig.has(Digit::Thumb));
                 for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
-                    let pairs = rig
-                        .digit(digit)
-                        .lengths
-                        .into_iter()
-                        .zip(adult.digit(digit).lengths);
-                    for (own, whole) in pairs {
+                    let [own, whole] = [rig, adult].map(|rig| rig.digit(digit).lengths);
+                    for (own, whole) in own.into_iter().zip(whole) {
                         assert!(
                             (own - whole).abs() < 2e-3,
                             "{fingers:?} {digit:?}: {own} for {whole}"
@@ -179,14 +247,9 @@ fn hands_keep_the_fingers_that_they_have() {
                 let breadth = at(Digit::Index).distance(at(Digit::Little));
                 let expected = whole(Digit::Index).distance(whole(Digit::Little));
                 assert!((breadth - expected).abs() < 2e-3, "{fingers:?}: {breadth}");
-                let posed = hand.binding.as_ref().unwrap().joints();
-                for (node, joint) in posed {
-                    // The root need not be a joint.
-                    let digit = joint.and_then(|joint| {
-                        (0..5).find(|&digit| {
-                            (index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]).contains(&joint)
-                        })
-                    });
+                for (node, joint) in hand.binding.as_ref().unwrap().joints() {
+                    let digit =
+                        joint.and_then(|joint| (0..5).find(|&digit| joints_of(digit).contains(&joint)));
                     assert!(digit.is_none_or(|digit| rig.has(Digit::ALL[digit])), "{node}");
                 }
             }
@@ -210,160 +273,11 @@ fn joints_at_rest_without_radii_are_no_finger() {
 }
 
 #[test]
-fn hands_that_cannot_oppose_are_refused_by_name() {
-    fn index_only(side: Handedness, joint: usize) -> Option<String> {
-        webxr(side, joint).filter(|_| joint < index::FIRST_OF_DIGIT[2])
-    }
-    fn thumbless(side: Handedness, joint: usize) -> Option<String> {
-        let is_thumb = (index::FIRST_OF_DIGIT[0]..=index::TIP_OF_DIGIT[0]).contains(&joint);
-        webxr(side, joint).filter(|_| !is_thumb)
-    }
-    for (name, expected) in [
-        (thumbless as Name, "hand, thumb: is missing; without a thumb"),
-        (index_only, "lacks the middle finger, ring finger, little finger"),
-    ] {
-        let texts = messages(read(&model(name)));
-        assert_eq!(texts.len(), 2, "{texts:?}");
-        assert!(
-            texts.iter().all(|message| message.contains(expected)),
-            "{texts:?}"
-        );
-    }
-}
-
-#[test]
-fn unknown_bones_below_the_wrist_are_no_missing_finger() {
-    fn odd(side: Handedness, joint: usize) -> Option<String> {
-        let is_little = joint >= index::FIRST_OF_DIGIT[4];
-        let name = mixamo(side, joint);
-        if is_little {
-            name.map(|_| format!("{side:?} spare {}", JOINT_NAMES[joint].len() + joint))
-        } else {
-            name
-        }
-    }
-    let texts = messages(read(&model(odd)));
-    assert_eq!(texts.len(), 2, "{texts:?}");
-    for side in ["left", "right"] {
-        assert_mentioned(
-            &texts,
-            &[side, "little finger: has no nodes with its names", "spare"],
-        );
-    }
-}
-
-/// Checks that a file gives the adult's rig, and returns its warnings.
-fn assert_is_adult(what: &str, glb: &[u8]) -> Vec<String> {
-    let rig = read(glb).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
-    for hand in [&rig.left, &rig.right] {
-        differences(&hand.rig, adult(hand.rig.handedness)).assert_below([2e-3, 1.0, 1.0], what);
-    }
-    rig.warnings
-}
-
-#[test]
-fn bones_without_a_node_are_skipped() {
-    fn old(names: &[String]) -> Value {
-        let mut extensions = vrm_0(names);
-        let bones = extensions["VRM"]["humanoid"]["humanBones"]
-            .as_array_mut()
-            .unwrap();
-        bones.insert(0, json!({ "bone": "jaw", "node": -1 }));
-        extensions
-    }
-    fn new(names: &[String]) -> Value {
-        let mut extensions = vrm_1(names);
-        extensions["VRMC_vrm"]["humanoid"]["humanBones"]["jaw"] = Value::Null;
-        extensions
-    }
-    for (what, extensions) in [("0.x", old as fn(&[String]) -> Value), ("1.0", new)] {
-        let style = Style {
-            extensions,
-            ..named(bone)
-        };
-        let warnings = assert_is_adult(what, &Character::new(&style).glb);
-        assert!(
-            warnings.iter().all(|warning| !warning.contains("VRM")),
-            "{warnings:?}"
-        );
-    }
-}
-
-#[test]
-fn thumbs_of_drafts_have_the_names_of_a_finger() {
-    fn draft(names: &[String]) -> Value {
-        let mut extensions = vrm_1(names);
-        let bones = extensions["VRMC_vrm"]["humanoid"]["humanBones"]
-            .as_object_mut()
-            .unwrap();
-        for side in ["left", "right"] {
-            let [first, second] =
-                ["Metacarpal", "Proximal"].map(|bone| bones.remove(&format!("{side}Thumb{bone}")).unwrap());
-            bones.insert(format!("{side}ThumbProximal"), first);
-            bones.insert(format!("{side}ThumbIntermediate"), second);
-        }
-        extensions
-    }
-    let style = Style {
-        extensions: draft,
-        ..named(bone)
-    };
-    assert_is_adult("draft", &Character::new(&style).glb);
-}
-
-#[test]
-fn fingers_that_the_extension_does_not_name_are_found_by_their_nodes() {
-    fn hands(names: &[String]) -> Value {
-        let node = |name: &str| names.iter().position(|other| other == name).unwrap();
-        json!({ "VRM": { "humanoid": { "humanBones": [
-            { "bone": "leftHand", "node": node("J_Bip_L_Hand") }, { "bone": "rightHand", "node": node("J_Bip_R_Hand") },
-        ] } } })
-    }
-    let style = Style {
-        extensions: hands,
-        ..named(vroid)
-    };
-    assert_is_adult("hands only", &Character::new(&style).glb);
-}
-
-#[test]
-fn bones_that_the_extension_leaves_out_are_found_by_their_nodes() {
-    fn without_distal(names: &[String]) -> Value {
-        let node = |name: String| names.iter().position(|other| *other == name).unwrap();
-        let mut bones = Vec::new();
-        for (side, letter) in [("left", 'L'), ("right", 'R')] {
-            bones
-                .push(json!({ "bone": format!("{side}Hand"), "node": node(format!("J_Bip_{letter}_Hand")) }));
-            for (number, part) in ["Proximal", "Intermediate"].iter().enumerate() {
-                let name = format!("J_Bip_{letter}_Index{}", number + 1);
-                bones.push(json!({ "bone": format!("{side}Index{part}"), "node": node(name) }));
-            }
-        }
-        json!({ "VRM": { "humanoid": { "humanBones": bones } } })
-    }
-    let style = Style {
-        extensions: without_distal,
-        ..named(vroid)
-    };
-    assert_is_adult("without the last bone", &Character::new(&style).glb);
-}
-
-#[test]
 fn bounds_of_positions_are_not_needed() {
     let glb = edited(&model(unity), |document| {
         let accessor = document["accessors"][0].as_object_mut().unwrap();
         accessor.remove("min");
         accessor.remove("max");
     });
-    assert_is_adult("without bounds", &glb);
-}
-
-#[test]
-fn an_extension_that_cannot_be_read_is_told() {
-    let style = Style {
-        extensions: |_| json!({ "VRM": { "humanoid": { "humanBones": 3 } } }),
-        ..named(vroid)
-    };
-    let warnings = assert_is_adult("broken", &Character::new(&style).glb);
-    assert_mentioned(&warnings, &["VRM extension cannot be read"]);
+    assert_is_adult(&read(&glb).unwrap(), [2e-3, 1.0, 1.0], "without bounds");
 }

@@ -4,7 +4,7 @@ use crate::{
     MappedJoint, RigSource, read_rig, rig_at_rest,
     tests::{
         LIMITS, assert_mentioned, messages,
-        rigs::{adult, adult_at_rest, edited, model, named, opened, read, source},
+        rigs::{Name, adult_at_rest, edited, joints_of, model, named, opened, read, read_style, source},
     },
 };
 use glam::{Mat4, Vec3};
@@ -15,8 +15,8 @@ use grasp_characters::{
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
-        Digit, HandPose, Handedness,
-        joints::{HandJoints, JOINT_COUNT, index},
+        HandPose, Handedness,
+        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, index},
         rig::Rig,
     },
     physical::solids::{HandSolids, SOFT_CONTACT, self_clearance},
@@ -24,15 +24,7 @@ use grasp_synthesis::{
 use serde_json::json;
 
 fn warnings(style: &Style) -> Vec<String> {
-    read(&Character::new(style).glb).unwrap().warnings
-}
-
-fn stretched(rig: &Rig) -> HandSolids {
-    let pose = HandPose {
-        frame_from_wrist: Pose::IDENTITY,
-        digits: rig.stretched(),
-    };
-    HandSolids::of_pose(rig, &pose)
+    read_style(style).unwrap().warnings
 }
 
 #[test]
@@ -51,50 +43,39 @@ fn what_is_taken_from_the_reference_is_told() {
 
 #[test]
 fn a_thumb_without_a_skin_is_told() {
-    // All that follows a thumb follows the wrist instead.
-    fn thumbless(side: Handedness, joint: usize) -> Option<String> {
-        let is_thumb = (index::FIRST_OF_DIGIT[0]..=index::TIP_OF_DIGIT[0]).contains(&joint);
-        webxr(side, joint).map(|name| if is_thumb { format!("{name}-mesh") } else { name })
+    // Twins of the thumb's nodes that move nothing, from the metacarpals, below the wrists, to the tips.
+    fn renamed(side: Handedness, joint: usize) -> Option<String> {
+        let name = webxr(side, joint)?;
+        Some(if joints_of(0).contains(&joint) {
+            format!("{name}-mesh")
+        } else {
+            name
+        })
     }
-    let glb = edited(&model(thumbless), |document| {
+    let glb = edited(&model(renamed), |document| {
         let nodes = document["nodes"].as_array_mut().unwrap();
-        let first = nodes.len();
-        let skinned: Vec<usize> = (0..first)
-            .filter(|&node| {
-                nodes[node]["name"]
-                    .as_str()
-                    .is_some_and(|name| name.ends_with("-mesh"))
-            })
-            .collect();
-        // Twins of the thumb's nodes that move nothing, from the metacarpals, below the wrists, to the tips.
-        for (twin, &node) in skinned.iter().enumerate() {
+        for node in 0..nodes.len() {
             let mut copy = nodes[node].clone();
-            let name = copy["name"]
-                .as_str()
-                .unwrap()
-                .trim_end_matches("-mesh")
-                .to_owned();
+            let name = copy["name"].as_str().unwrap_or_default().to_owned();
+            let Some(name) = name.strip_suffix("-mesh") else {
+                continue;
+            };
             copy["name"] = json!(name);
+            let twin = nodes.len();
             if !name.ends_with("tip") {
-                copy["children"] = json!([first + twin + 1]);
+                copy["children"] = json!([twin + 1]);
             }
             nodes.push(copy);
             if name.ends_with("metacarpal") {
                 let wrist = format!("{}-wrist", name.split('-').next().unwrap());
                 let wrist = nodes.iter_mut().find(|node| node["name"] == wrist).unwrap();
-                wrist["children"]
-                    .as_array_mut()
-                    .unwrap()
-                    .push(json!(first + twin));
+                wrist["children"].as_array_mut().unwrap().push(json!(twin));
             }
         }
     });
     let texts = read(&glb).unwrap().warnings;
-    for side in ["left hand", "right hand"] {
-        assert_mentioned(
-            &texts,
-            &[&format!("{side}, thumb: has bones, but they move no skin")],
-        );
+    for side in ["left", "right"] {
+        assert_mentioned(&texts, &[side, "hand, thumb: has bones, but they move no skin"]);
     }
 }
 
@@ -132,72 +113,131 @@ fn bones_outside_of_their_skin_are_told_or_refused_with_the_distance() {
 }
 
 #[test]
-fn fists_are_refused_and_bent_fingers_told() {
+fn bent_fingers_are_told() {
     let bent = |bend| Style { bend, ..Style::PLAIN };
     assert_eq!(warnings(&bent(0.2)), [""; 0]);
     let texts = warnings(&bent(0.6));
     assert_mentioned(&texts, &["right hand, index finger: is bent by 10"]);
-    let found = messages(read(&Character::new(&bent(1.3)).glb));
-    assert_mentioned(&found, &["hand, middle finger: is bent by 2", "hand open"]);
+}
+
+/// The names of a program or client that calls the bone in the palm the proximal one.
+fn shifted(side: Handedness, joint: usize) -> Option<String> {
+    let of_finger =
+        (1..5).find(|&digit| joints_of(digit).contains(&joint) && joint < index::TIP_OF_DIGIT[digit]);
+    match of_finger {
+        Some(digit) if joint == index::FIRST_OF_DIGIT[digit] + 3 => Some(format!("{side:?} last {digit}")),
+        Some(_) => webxr(side, joint + 1),
+        None => webxr(side, joint).filter(|_| joint <= index::TIP_OF_DIGIT[0]),
+    }
+}
+
+fn index_only(side: Handedness, joint: usize) -> Option<String> {
+    webxr(side, joint).filter(|_| joint < index::FIRST_OF_DIGIT[2])
+}
+
+fn thumbless(side: Handedness, joint: usize) -> Option<String> {
+    webxr(side, joint).filter(|_| !joints_of(0).contains(&joint))
+}
+
+/// Little fingers whose bones have other names.
+fn spare(side: Handedness, joint: usize) -> Option<String> {
+    let name = mixamo(side, joint)?;
+    let is_little = joint >= index::FIRST_OF_DIGIT[4];
+    Some(if is_little {
+        format!("{side:?} spare {}", JOINT_NAMES[joint].len() + joint)
+    } else {
+        name
+    })
+}
+
+/// Without the outer bones of the little fingers and the last ones of the thumbs.
+fn broken(side: Handedness, joint: usize) -> Option<String> {
+    let is_of_little = joint > index::FIRST_OF_DIGIT[4] + 1;
+    mixamo(side, joint).filter(|_| !is_of_little && joint != 4)
+}
+
+fn swapped(side: Handedness, joint: usize) -> Option<String> {
+    mixamo(side.other(), joint)
 }
 
 #[test]
-fn bones_in_the_palm_are_not_taken_for_those_that_bend() {
-    // A client's map, or a program, calls the bone in the palm the proximal one.
-    fn shifted(side: Handedness, joint: usize) -> Option<String> {
-        let of_finger =
-            (1..5).find(|&digit| (index::FIRST_OF_DIGIT[digit]..index::TIP_OF_DIGIT[digit]).contains(&joint));
-        match of_finger {
-            Some(digit) if joint == index::FIRST_OF_DIGIT[digit] + 3 => {
-                Some(format!("{side:?} last {digit}"))
-            }
-            Some(_) => webxr(side, joint + 1),
-            None => webxr(side, joint).filter(|_| joint <= index::TIP_OF_DIGIT[0]),
+fn hands_that_cannot_hold_are_refused_with_the_place() {
+    let fist = Style {
+        bend: 1.3,
+        ..Style::PLAIN
+    };
+    let giant = Style {
+        size: 100.0,
+        ..named(mixamo)
+    };
+    assert_mentioned(&messages(read_style(&giant)), &["m long, after units"]);
+    let cases: [(Style, &[&str]); 7] = [
+        (fist, &["hand, middle finger: is bent by 2", "hand open"]),
+        (
+            named(shifted),
+            &["hand, index-finger-phalanx-proximal: is ", "bones in the palm"],
+        ),
+        (
+            named(index_only),
+            &["hand: lacks the middle finger, ring finger, little finger"],
+        ),
+        (named(thumbless), &["hand, thumb: is missing; without a thumb"]),
+        (
+            named(spare),
+            &["hand, little finger: has no nodes with its names", "spare"],
+        ),
+        (named(broken), &["hand, pinky-finger-phalanx-distal: is missing"]),
+        (
+            named(swapped),
+            &["hand: has fingers that bend backward", "swapped"],
+        ),
+    ];
+    for (style, words) in cases {
+        let texts = messages(read_style(&style));
+        for side in ["left ", "right "] {
+            assert_mentioned(&texts, &[&[side][..], words].concat());
         }
     }
-    let found = messages(read(&model(shifted)));
-    assert_mentioned(
-        &found,
-        &[
-            "right hand, index-finger-phalanx-proximal: is ",
-            "bones in the palm",
-        ],
-    );
+    for (name, count) in [
+        (index_only as Name, 2),
+        (thumbless, 2),
+        (spare, 2),
+        (broken, 6),
+        (swapped, 2),
+    ] {
+        let texts = messages(read(&model(name)));
+        assert_eq!(texts.len(), count, "{texts:?}");
+    }
 }
 
 #[test]
 fn flesh_that_overlaps_at_rest_is_no_collision() {
-    for thickness in [1.3, 1.6] {
-        let mut rest = adult_at_rest(Handedness::Right);
-        for joint in &mut rest.joints[index::FIRST_OF_DIGIT[1]..] {
-            joint.radius *= thickness;
-        }
-        let imported = rig_at_rest(&[rest], source(&[])).unwrap();
-        for rig in [
-            &imported.right.rig,
-            &imported.left.rig,
-            &imported.right.rig.scaled(1.4),
-        ] {
-            let stiff = Rig {
-                rest_overlaps: None,
-                ..rig.clone()
-            };
-            let solids = stretched(rig);
-            assert!(self_clearance(&stiff, &solids) < 0.0, "{thickness}: they overlap");
-            assert!((self_clearance(rig, &solids) - SOFT_CONTACT).abs() < 1e-6);
-            // Fingers that cross go through each other all the same.
-            let mut crossed = HandPose {
-                frame_from_wrist: Pose::IDENTITY,
-                digits: rig.stretched(),
-            };
-            crossed.digits[1].base_yaw = 0.45;
-            crossed.digits[2].base_yaw = -0.45;
-            assert!(self_clearance(rig, &HandSolids::of_pose(rig, &crossed)) < -0.002);
-        }
+    let mut rest = adult_at_rest(Handedness::Right);
+    for joint in &mut rest.joints[index::FIRST_OF_DIGIT[1]..] {
+        joint.radius *= 1.5;
     }
-    // A copy of the built-in hand is clear as the original is.
-    let copy = rig_at_rest(&[adult_at_rest(Handedness::Right)], source(&[])).unwrap();
-    assert!(self_clearance(&copy.right.rig, &stretched(adult(Handedness::Right))) > 0.0);
+    let imported = rig_at_rest(&[rest], source(&[])).unwrap();
+    for rig in [
+        &imported.right.rig,
+        &imported.left.rig,
+        &imported.right.rig.scaled(1.4),
+    ] {
+        let stiff = Rig {
+            rest_overlaps: None,
+            ..rig.clone()
+        };
+        let mut pose = HandPose {
+            frame_from_wrist: Pose::IDENTITY,
+            digits: rig.stretched(),
+        };
+        let solids = HandSolids::of_pose(rig, &pose);
+        assert!(self_clearance(&stiff, &solids) < 0.0, "they overlap");
+        assert!((self_clearance(rig, &solids) - SOFT_CONTACT).abs() < 1e-6);
+        // Fingers that cross go through each other all the same.
+        pose.digits[1].base_yaw = 0.45;
+        pose.digits[2].base_yaw = -0.45;
+        assert!(self_clearance(rig, &HandSolids::of_pose(rig, &pose)) < -0.002);
+    }
 }
 
 #[test]
@@ -225,10 +265,7 @@ fn widths_are_scaled_or_given() {
             };
             assert!((own.joint_radii[joint] - expected).abs() < 1e-6, "{joint}");
         }
-        assert_eq!(
-            own.digit(Digit::Index).lengths,
-            measured.digit(Digit::Index).lengths
-        );
+        assert_eq!(own.digits[1].lengths, measured.digits[1].lengths);
     }
     let joints: HandJoints = adult_at_rest(Handedness::Right);
     let given = rig_at_rest(&[joints], source).unwrap().right.rig;
@@ -237,21 +274,14 @@ fn widths_are_scaled_or_given() {
 
 #[test]
 fn two_files_make_one_rig_of_the_hands_that_they_show() {
-    let of_side = |side| {
-        let sides: &'static [Handedness] = match side {
-            Handedness::Left => &[Handedness::Left],
-            Handedness::Right => &[Handedness::Right],
+    let of_side = |sides| {
+        let style = Style {
+            sides,
+            ..named(mixamo)
         };
-        read(
-            &Character::new(&Style {
-                sides,
-                ..named(mixamo)
-            })
-            .glb,
-        )
-        .unwrap()
+        read_style(&style).unwrap()
     };
-    let (left, right) = (of_side(Handedness::Left), of_side(Handedness::Right));
+    let (left, right) = (of_side(&[Handedness::Left]), of_side(&[Handedness::Right]));
     let both = right.clone().joined(left.clone()).unwrap();
     assert!(both.left.binding.is_some() && both.right.binding.is_some());
     assert!(!both.left.is_mirrored && !both.right.is_mirrored);
@@ -264,27 +294,6 @@ fn two_files_make_one_rig_of_the_hands_that_they_show() {
     let whole = read(&model(mixamo)).unwrap();
     let more = whole.joined(left).unwrap_err();
     assert!(more.to_string().contains("both hands"), "{more}");
-}
-
-#[test]
-fn missing_joints_are_all_named() {
-    fn broken(side: Handedness, joint: usize) -> Option<String> {
-        let is_of_little = joint > index::FIRST_OF_DIGIT[4] + 1;
-        (!is_of_little && joint != 4)
-            .then(|| mixamo(side, joint))
-            .flatten()
-    }
-    let found = messages(read(&model(broken)));
-    for side in ["left hand", "right hand"] {
-        for joint in [
-            "thumb-phalanx-distal",
-            "pinky-finger-phalanx-intermediate",
-            "pinky-finger-phalanx-distal",
-        ] {
-            assert_mentioned(&found, &[&format!("{side}, {joint}: is missing")]);
-        }
-    }
-    assert_eq!(found.len(), 6, "{found:?}");
 }
 
 #[test]
@@ -304,13 +313,9 @@ fn impossible_joints_at_rest_are_all_named() {
         joints[14].x = f32::NAN;
         joints[20] = joints[19] + 0.45 * Vec3::Y;
     });
-    for expected in [
-        "index-finger-phalanx-intermediate: is 0.0000 m",
-        "middle-finger-phalanx-distal: is not at a finite",
-        "ring-finger-tip: is 0.4500 m",
-    ] {
-        assert_mentioned(&found, &[expected]);
-    }
+    assert_mentioned(&found, &["index-finger-phalanx-intermediate: is 0.0000 m"]);
+    assert_mentioned(&found, &["middle-finger-phalanx-distal: is not at a finite"]);
+    assert_mentioned(&found, &["ring-finger-tip: is 0.4500 m"]);
     let among = with(&|joints| {
         let across = joints[17] - joints[2];
         for joint in &mut joints[2..6] {
@@ -324,29 +329,6 @@ fn impossible_joints_at_rest_are_all_named() {
         }
     });
     assert_mentioned(&line, &["no breadth"]);
-}
-
-#[test]
-fn swapped_hands_are_found() {
-    fn swapped(side: Handedness, joint: usize) -> Option<String> {
-        mixamo(side.other(), joint)
-    }
-    let found = messages(read(&model(swapped)));
-    assert_eq!(found.len(), 2, "{found:?}");
-    assert!(
-        found.iter().all(|message| message.contains("swapped")),
-        "{found:?}"
-    );
-}
-
-#[test]
-fn wrong_units_are_found() {
-    let style = Style {
-        size: 100.0,
-        ..named(mixamo)
-    };
-    let found = messages(read(&Character::new(&style).glb));
-    assert_mentioned(&found, &["m long, after units"]);
 }
 
 #[test]
