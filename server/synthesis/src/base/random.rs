@@ -7,8 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// 2^-24: spacing of uniform numbers made from 24 random bits, the precision of an `f32` below 1.
 const UNIT_24: f32 = 1.0 / (1 << 24) as f32;
 
-/// 2^-20: spacing of numbers in [-1, 1) made from 21 random bits; three of them fit into one draw. Wrist positions thus fall on a
-/// grid finer than a micrometre.
+/// 2^-20: spacing of numbers in [-1, 1) made from 21 random bits; three of them fit into one draw.
 const SIGNED_21: f32 = 1.0 / (1 << 20) as f32;
 
 /// The source of all randomness in one attempt.

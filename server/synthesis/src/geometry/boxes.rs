@@ -77,12 +77,10 @@ impl Aabb {
     }
 }
 
-/// Number of directions whose outermost vertices the box is fitted to, about 7° apart. More fit rounded objects
-/// better and take longer; the last step makes the box enclose every vertex in any case.
+/// Number of directions whose outermost vertices the box is fitted to, about 7° apart.
 const SUPPORT_DIRECTIONS: usize = 256;
 
-/// Number of initial orientations in addition to the object's axes and its principal axes, against local minima. Each
-/// costs about 0.2 ms; real objects need about 4.
+/// Number of initial orientations in addition to the object's axes and its principal axes, against local minima.
 const EXTRA_ORIENTATIONS: usize = 10;
 
 /// Upper bound of turns from one initial orientation. Most fits end after ten.
@@ -125,9 +123,6 @@ impl OrientedBox {
     }
 
     /// As [`Self::around`], unless it is stopped.
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(crate) fn around_until(mesh: &TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
         let used = used_vertices(mesh);
         let vertices = || used.iter().map(|&v| mesh.positions()[v as usize].as_dvec3());
@@ -227,8 +222,7 @@ fn outermost<I: Iterator<Item = DVec3>>(
     Ok(chosen.into_iter().map(|index| all[index]).collect())
 }
 
-/// Directions spread evenly over the sphere by a golden-angle spiral (R. Swinbank, R. J. Purser: Fibonacci grids,
-/// 2006).
+/// Directions spread evenly over the sphere by a golden-angle spiral (R. Swinbank, R. J. Purser: Fibonacci grids, 2006).
 fn directions(count: usize) -> impl Iterator<Item = DVec3> {
     let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     (0..count).map(move |i| {
@@ -357,8 +351,7 @@ fn nearest_to_identity(axes: DMat3) -> DMat3 {
     DMat3::from_cols(x, y, x.cross(y))
 }
 
-/// Upper bound on the error of distances from capsules, in metres. Smaller values take longer and change nothing that
-/// single precision shows within arm's reach.
+/// Upper bound on the error of distances from capsules, in metres.
 const TOLERANCE: f64 = 1e-7;
 
 /// A box prepared for many distances. It computes in double precision, because a floor is wide and the hand on it small.

@@ -18,12 +18,10 @@ use super::{
 /// what matters to a hand.
 const SLACK: f32 = 1e-6;
 
-/// How much closer a triangle must be to replace the one found so far, in metres: the accuracy of the result. With 0,
-/// every triangle of a flat face that is equally close would be visited.
+/// How much closer a triangle must be to replace the one found so far, in metres: the accuracy of the result.
 const ACCURACY: f32 = 1e-5;
 
-/// Floor of determinants of two directions before division, in m⁴: positive, and below that of two perpendicular
-/// micrometres. Parameters from such pairs are clamped and only yield distances that occur.
+/// Floor of determinants of two directions before division, in m⁴: positive, and below that of two perpendicular micrometres.
 const MIN_DETERMINANT: f32 = 1e-30;
 
 /// Where a mesh's surface comes closest to a capsule's skin or penetrates it deepest.

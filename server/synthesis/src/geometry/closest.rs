@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3, Vec4};
 use super::{
     Segment,
     boxes::Aabb,
-    crossing::{ExactCrossing, ExactQuery, cross, dot, minus, splat},
+    crossing::{ExactQuery, cross, dot, minus, splat},
     mesh::TriangleMesh,
     tapered_capsule::TaperedCapsule,
     wide_bvh::{Node, TrianglePack, WideBvh, lanes},
@@ -29,9 +29,6 @@ pub(super) struct GivenUp;
 
 /// The triangle closest to a point, the closest point on it and its distance; `None` beyond `max_distance` metres. Gives up once
 /// `may_go_on` returns false, which is called for each node and each pack of triangles.
-///
-/// # Errors
-/// [`GivenUp`].
 // Not inlined: far points return early and must not pay for the stack.
 #[inline(never)]
 pub(super) fn closest(
@@ -185,8 +182,7 @@ pub(super) fn distance_of_point(corners: [Vec3; 3], point: Vec3) -> f32 {
 
 /// True if a segment crosses a triangle or meets its edge.
 pub(super) fn is_crossed(corners: [Vec3; 3], segment: Segment) -> bool {
-    let crossing = ExactQuery::new(segment).test(corners);
-    !matches!(crossing, ExactCrossing::Miss | ExactCrossing::Graze(None))
+    ExactQuery::new(segment).crossing(corners).is_some()
 }
 
 /// The distance of a segment from a triangle, in metres: 0 where they cross, or else at an end of the segment or an edge.

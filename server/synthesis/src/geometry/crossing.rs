@@ -20,7 +20,6 @@ use super::{
 const ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 /// Relative slack of the interval in which a segment is inside a box: three roundings each of two plane distances.
-/// Larger is safe and visits more nodes.
 const SLAB_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
 
 /// Replaces zero components of the direction, in metres, to keep their inverse finite: far below the spacing of
@@ -173,7 +172,7 @@ impl ExactQuery {
     }
 
     /// The crossing, in the interior or on an edge.
-    fn crossing(&self, corners: [Vec3; 3]) -> Option<Crossing> {
+    pub(super) fn crossing(&self, corners: [Vec3; 3]) -> Option<Crossing> {
         match self.test(corners) {
             ExactCrossing::Miss => None,
             ExactCrossing::Graze(crossing) => crossing,

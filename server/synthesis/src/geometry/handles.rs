@@ -18,8 +18,7 @@ use crate::base::{
     stop::{Stop, Stopped},
 };
 
-/// Points of the surface below which a part is sought, and the seed by which they are drawn. Fewer miss short handles of large
-/// objects.
+/// Points of the surface below which a part is sought, and the seed by which they are drawn.
 const SAMPLES: u64 = 1024;
 const SEED: u64 = 0x4841_4e44;
 

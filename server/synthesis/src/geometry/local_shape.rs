@@ -13,12 +13,10 @@ const PATCH_SAMPLES: usize = 16;
 /// of a wall are then 4 cm apart and never share a patch.
 const NORMAL_LENGTH: f32 = 0.02;
 
-/// Distance from the centre, as a multiple of the radius, at which a patch no longer counts. Closer to 1, shapes change
-/// more abruptly from place to place.
+/// Distance from the centre, as a multiple of the radius, at which a patch no longer counts.
 const FADED: f32 = 1.4;
 
-/// Height of a patch over the centre, as a share of the radius, above which it faces away from the centre. A patch that
-/// faces the centre, the inner wall of a cup, counts as if turned over; in between, gradually.
+/// Height of a patch over the centre, as a share of the radius, above which it faces away from the centre.
 const TURNED: f32 = 0.02;
 
 /// Smallest variance of unit normals for a full [`Part::sphericity`]: that of a cap of 16°. Less shows no curvature.

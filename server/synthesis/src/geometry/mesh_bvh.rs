@@ -53,9 +53,6 @@ impl MeshBvh {
     }
 
     /// As [`Self::build`], unless it is stopped.
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(crate) fn build_until(mesh: impl Into<Arc<TriangleMesh>>, stop: Stop<'_>) -> Result<Self, Stopped> {
         Self::with_quality(mesh.into(), true, stop)
     }
@@ -122,7 +119,7 @@ impl MeshBvh {
 
     /// Number of edges of holes, in proportion to which [`Self::contains`] takes time.
     pub fn rim_edges(&self) -> usize {
-        self.containment.rim_edges()
+        self.containment.caps.len()
     }
 
     /// How many packs of up to four triangles a search along a segment has to look at, at most.
@@ -202,16 +199,13 @@ impl MeshBvh {
     }
 }
 
-/// Target number of grid nodes. More tighten the bounds (half the spacing takes eight times as many) at about 0.2 µs
-/// of preparation and 4 bytes per node.
+/// Target number of grid nodes.
 const TARGET_NODES: f32 = 32_768.0;
 
-/// Largest number of grid nodes. Objects that are very long and thin for their grid need more than the target, because no axis has
-/// fewer than two.
+/// Largest number of grid nodes.
 const MAX_NODES: f32 = 4.0 * TARGET_NODES;
 
-/// How far the grid extends beyond the mesh's box, in metres: about the length of a phalanx. Farther out, the box
-/// itself gives as good a bound.
+/// How far the grid extends beyond the mesh's box, in metres: about the length of a phalanx.
 const MARGIN: f32 = 0.04;
 
 /// By how much the spacing grows until the nodes are few enough.
@@ -221,7 +215,6 @@ const COARSER: f32 = 1.25;
 const NODES_PER_CHECK: usize = 4;
 
 /// Steps of the search for the closest triangle that each node adds to what the nodes may take, and what each half begins with.
-/// Ordinary objects take a tenth; thousands of needles through one place would take all of their triangles for each node.
 const STEPS_PER_NODE: usize = 128;
 const SPARE_STEPS: usize = 1 << 17;
 

@@ -12,8 +12,7 @@ use super::{
 };
 use crate::base::stop::{Stop, Stopped};
 
-/// Cosine of the angle from which two normals oppose each other: a right angle, to single precision. Larger values let
-/// the edges of a rotated box count as places to press.
+/// Cosine of the angle from which two normals oppose each other: a right angle, to single precision.
 const OPPOSED_COS: f32 = -1e-3;
 
 /// Relative accuracy of the distance. Smaller values compare more of the many equal pairs of a round surface.
@@ -22,8 +21,7 @@ pub const OPPOSED_ACCURACY: f32 = 0.05;
 /// Triangles in a leaf. More leaves take memory, larger ones more comparisons.
 const LEAF: usize = 4;
 
-/// Upper bound on the pairs of nodes compared, some tens of milliseconds of work. Only large, finely meshed and strongly
-/// curved objects need more; their distance counts as unknown.
+/// Upper bound on the pairs of nodes compared, some tens of milliseconds of work.
 const MAX_PAIRS: usize = 400_000;
 
 /// Pairs compared between two checks whether to stop.
@@ -55,7 +53,10 @@ pub fn opposed_distance(
 ) -> Result<OpposedDistance, Stopped> {
     let triangles: Vec<Triangle> = (0..mesh.triangles().len())
         .filter(|&triangle| is_used(triangle as u32))
-        .map(|triangle| Triangle::new(mesh.corners(triangle), mesh.normal(triangle)))
+        .map(|triangle| Triangle {
+            corners: mesh.corners(triangle),
+            normal: mesh.normal(triangle),
+        })
         .collect();
     if triangles.is_empty() {
         return Ok(OpposedDistance::BeyondLimit);
@@ -92,10 +93,6 @@ struct Tree {
 }
 
 impl Triangle {
-    fn new(corners: [Vec3; 3], normal: Vec3) -> Self {
-        Self { corners, normal }
-    }
-
     fn centre(&self) -> Vec3 {
         let [a, b, c] = self.corners;
         (a + b + c) / 3.0

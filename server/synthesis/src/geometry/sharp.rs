@@ -27,8 +27,7 @@ const SHARP_COS: f32 = -0.866;
 /// Least length of an edge in metres: shorter ones are flaws of a mesh.
 const MIN_LENGTH: f32 = 0.01;
 
-/// Largest sum of the angles at a vertex, in radians, that makes it a point: that of a cone with half an angle of 20° at its
-/// tip.
+/// Largest sum of the angles at a vertex, in radians, that makes it a point: that of a cone with half an angle of 20° at its tip.
 const POINT_ANGLES: f32 = 2.15;
 
 /// Edges at a point that are at least this long, in metres, show that it is more than a spike of the mesh.
@@ -224,9 +223,6 @@ struct Section {
 }
 
 /// Points on worn edges that are at least a centimetre long; takes some milliseconds.
-///
-/// # Errors
-/// [`Stopped`].
 fn worn_edges(surface: &MeshBvh, stop: Stop<'_>) -> Result<Vec<Vec3>, Stopped> {
     let sampler = SurfaceSampler::new(surface.mesh(), |_| true);
     let mut ends = Vec::new();

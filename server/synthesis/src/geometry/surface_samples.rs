@@ -1,6 +1,6 @@
 //! Points drawn evenly from a mesh's surface, and the thickness of its parts as they show.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::OnceLock;
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -89,8 +89,7 @@ pub(crate) fn ray_stride(
     for_packs.max(for_rims).max(1)
 }
 
-/// Points drawn from a mesh to learn the shape of its parts. Fewer miss thin parts next to large ones; the time to compare
-/// them all grows with the square, to 3 ms.
+/// Points drawn from a mesh to learn the shape of its parts.
 const SAMPLES: u64 = 1024;
 
 /// Seed of the samples: arbitrary, but fixed so that a mesh always has the same shape.
@@ -129,45 +128,16 @@ const MIN_NEIGHBOURS: usize = 16;
 /// The thickness of the parts of a mesh around samples of its surface, each measured when it is first needed.
 #[derive(Clone, Debug, Default)]
 pub struct LocalThickness {
-    samples: Vec<(Vec3, Measured)>,
-}
-
-/// A thickness once it is measured, in four bytes. Whoever measures it finds the same.
-#[derive(Debug)]
-struct Measured(AtomicU32);
-
-impl Default for Measured {
-    fn default() -> Self {
-        Self(AtomicU32::new(f32::NAN.to_bits()))
-    }
-}
-
-impl Clone for Measured {
-    fn clone(&self) -> Self {
-        Self(AtomicU32::new(self.0.load(Ordering::Relaxed)))
-    }
-}
-
-impl Measured {
-    fn get_or(&self, measure: impl FnOnce() -> f32) -> f32 {
-        let known = f32::from_bits(self.0.load(Ordering::Relaxed));
-        if !known.is_nan() {
-            return known;
-        }
-        let measured = measure();
-        self.0.store(measured.to_bits(), Ordering::Relaxed);
-        measured
-    }
+    samples: Vec<(Vec3, OnceLock<f32>)>,
 }
 
 impl LocalThickness {
     /// Of a mesh with these points, which are spread evenly over it.
     pub fn of(samples: &[SurfaceSample]) -> Self {
         let samples = samples.iter();
+        let samples = samples.map(|sample| (sample.position, OnceLock::new()));
         Self {
-            samples: samples
-                .map(|sample| (sample.position, Measured::default()))
-                .collect(),
+            samples: samples.collect(),
         }
     }
 
@@ -183,7 +153,7 @@ impl LocalThickness {
         }
         let (_, nearest) = nearest;
         nearest.map_or(0.0, |(centre, measured)| {
-            measured.get_or(|| self.measure(*centre))
+            *measured.get_or_init(|| self.measure(*centre))
         })
     }
 

@@ -4,8 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::base::pose::Pose;
 
-/// Squared sine of the angle below which two axes count as parallel: they diverge by a micrometre over 10 cm. The
-/// closest points of parallel axes always include an end of one of them.
+/// Squared sine of the angle below which two axes count as parallel: they diverge by a micrometre over 10 cm.
 const PARALLEL: f64 = 1e-10;
 
 /// Steps of the search along an axis, each of which leaves two thirds of it: 25 cm become less than a micrometre.

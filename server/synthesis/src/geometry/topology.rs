@@ -37,7 +37,7 @@ const DIRECTIONS: [Vec3; 4] = [
 
 /// A triangle of the cone that closes a hole.
 #[derive(Clone, Copy, Debug)]
-struct Cap {
+pub(super) struct Cap {
     corners: [Vec3; 3],
     /// Its multiplicity, signed.
     count: f64,
@@ -46,7 +46,8 @@ struct Cap {
 /// What the containment test needs in addition to the hierarchy.
 #[derive(Clone, Debug)]
 pub(super) struct Containment {
-    caps: Vec<Cap>,
+    /// One for each edge of the holes' rims, in proportion to which each test takes time.
+    pub(super) caps: Vec<Cap>,
     /// One flag per triangle: true if it belongs to a sheet. Empty without sheets.
     is_sheet: Vec<bool>,
     /// Length of the rays, in metres: enough to leave the box of mesh and cones from any point in it.
@@ -55,9 +56,6 @@ pub(super) struct Containment {
 
 impl Containment {
     /// Finds the rims of a mesh's holes and closes them; O(n).
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(super) fn of(mesh: &TriangleMesh, aabb: &Aabb, stop: Stop<'_>) -> Result<Self, Stopped> {
         let mut boundary = boundary_chain(mesh);
         let is_sheet = if boundary.is_empty() {
@@ -115,11 +113,6 @@ impl Containment {
             }
         }
         Some(winding)
-    }
-
-    /// Number of edges of the holes' rims, in proportion to which each test takes time.
-    pub(super) fn rim_edges(&self) -> usize {
-        self.caps.len()
     }
 
     /// Memory use in bytes.
@@ -226,9 +219,6 @@ impl Topology {
 /// One flag per triangle: true if it belongs to a sheet, a connected part that is nearly flat and not a face of something
 /// that encloses a volume: a card without thickness, a leaf, a sail. Empty if there is none. `winding` gives the winding
 /// number of the whole mesh at a point; it is asked [`MAX_QUERIES`] times.
-///
-/// # Errors
-/// [`Stopped`].
 fn sheets(mesh: &TriangleMesh, stop: Stop<'_>, winding: impl Fn(Vec3) -> f64) -> Result<Vec<bool>, Stopped> {
     let mut parts = connected_parts(mesh, &sorted_edges(mesh));
     let triangles = mesh.triangles().len();

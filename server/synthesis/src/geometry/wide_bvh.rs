@@ -17,8 +17,7 @@ use crate::base::stop::{Stop, Stopped};
 /// Children per node and triangles per pack.
 const WIDTH: usize = 4;
 
-/// Entries of the traversal stack that queries keep on the call stack. Trees of a few thousand triangles need about
-/// 30; deeper trees use the heap, at about 20 ns per query.
+/// Entries of the traversal stack that queries keep on the call stack.
 const STACK_ENTRIES: usize = 64;
 
 /// Bit that marks a child as a pack of triangles.

@@ -156,9 +156,6 @@ impl GraspObject {
     }
 
     /// [`Self::parts`], unless it is stopped.
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(crate) fn parts_until(&self, stop: Stop<'_>) -> Result<&Parts, Stopped> {
         if let Some(parts) = self.parts.get() {
             return Ok(parts);
@@ -253,9 +250,6 @@ pub struct Parts {
 
 impl Parts {
     /// Finds the parts; takes some milliseconds.
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(super) fn of(object: &GraspObject, stop: Stop<'_>) -> Result<Self, Stopped> {
         let is_forbidden = |triangle: u32| object.is_forbidden(triangle);
         let handles = Handles::of(&object.surface, stop, is_forbidden)?;

@@ -8,8 +8,7 @@ use super::{
 };
 use crate::geometry::zone::Zone;
 
-/// Largest share of a preferred region's weight that contacts may miss for what an owner would choose. Regions of less weight
-/// decide between grasps but reject none.
+/// Largest share of a preferred region's weight that contacts may miss for what an owner would choose.
 pub(crate) const MAX_MISSED: f32 = 0.5;
 
 /// Largest share of weight to avoid under contacts for what an owner would choose.

@@ -56,9 +56,9 @@ pub enum Term {
     OffSharp,
 }
 
-/// All terms: name, weight, and whether it depends on the hand and the object alone. Firmness is weighted by how well it predicts which grips survive pushes from all sides in an independent simulation;
-/// each of its terms is mostly earned at a threshold ([`crate::rating::scoring`]). Where a hand comes from and what it holds are
-/// what people notice first: weighted by how well they tell hands that people would choose from others (`tests/src/pairs.csv`).
+/// All terms: name, weight, and whether it depends on the hand and the object alone. Firmness is weighted by how well it predicts
+/// which grips survive pushes from all sides in an independent simulation. Where a hand comes from and what it holds are what
+/// people notice first: weighted by how well they tell hands that people would choose from others (`tests/src/pairs.csv`).
 const TABLE: [(Term, &str, f32, bool); TERMS] = [
     (Term::Comfort, "comfort", 1.0, false),
     (Term::FrictionReserve, "friction_reserve", 10.0, false),
@@ -141,8 +141,7 @@ impl RegionTerm {
     }
 }
 
-/// Weight in the mean of a region term of the greatest importance. An owner knows the object: it outweighs any two of the other
-/// terms.
+/// Weight in the mean of a region term of the greatest importance.
 const REGION_WEIGHT: f32 = 30.0;
 
 /// What a grasp earns by an object's regions.

@@ -16,8 +16,7 @@ use crate::{
     model::holdout::{HandMesh, HandShape, Holdout, Obstacle},
 };
 
-/// How much closer than to another hand a hand may come to an obstacle, in metres: 0.1 mm remain, against rounding. A
-/// hand that takes something thin from a table all but touches it; with half of this, no pen on a table can be taken.
+/// How much closer than to another hand a hand may come to an obstacle, in metres: 0.1 mm remain, against rounding.
 pub(super) const CLOSER_TO_OBSTACLES: f32 = 0.0009;
 
 /// Clearance between the hand and forearm and obstacles, in metres.

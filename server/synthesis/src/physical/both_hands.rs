@@ -127,8 +127,7 @@ fn bearing_contacts(contacts: [&[Contact]; 2]) -> Vec<(usize, usize)> {
 /// Largest angle between the forearms, as its cosine: 110°. Wider ones would embrace the object.
 const MIN_FOREARM_COS: f32 = -0.342;
 
-/// Range of a forearm's rise from the elbow to the wrist, as sines: from 58° down to 64° up. Steeper ones need a body above
-/// or below the object.
+/// Range of a forearm's rise from the elbow to the wrist, as sines: from 58° down to 64° up.
 const FOREARM_RISE: [f32; 2] = [-0.85, 0.9];
 
 /// Smallest height of the thumb's side of the hand over the other side, as the sine of its slope: forearms twist from
@@ -145,8 +144,7 @@ const MIN_FACING: f32 = 0.3;
 /// How far a hand may point back at its body: the cosine of 96°.
 const MIN_FORWARD_COS: f32 = -0.1;
 
-/// How far the right hand may be to the left of the left one, in metres: a finger's breadth, for hands one above the
-/// other.
+/// How far the right hand may be to the left of the left one, in metres: a finger's breadth, for hands one above the other.
 const MAX_CROSSING: f32 = 0.02;
 
 /// Range of the elbows' distance, in metres: from close together in front of the body, measured across it, to as far apart

@@ -47,7 +47,23 @@ pub(super) struct Closer<'a> {
     pub object_from_wrist: Pose,
 }
 
-impl Closer<'_> {
+impl<'a> Closer<'a> {
+    /// What closes the digits of a posed hand.
+    pub(super) fn of_pose(
+        scene: &'a ObjectScene<'a>,
+        rig: &'a Rig,
+        barriers: Barriers<'a>,
+        shape: &'a HandShape,
+        pose: &HandPose,
+    ) -> Self {
+        Self {
+            scene,
+            barriers,
+            rig,
+            shape,
+            object_from_wrist: pose.frame_from_wrist,
+        }
+    }
     /// The hand pose with these digits.
     pub(super) fn pose(&self, digits: &[ClosedDigit; 5]) -> HandPose {
         HandPose {
@@ -57,12 +73,12 @@ impl Closer<'_> {
     }
 
     /// A digit before it closes, with the shape's yaw or another one.
-    pub(super) fn closing<'a>(
-        &'a self,
+    pub(super) fn closing<'b>(
+        &'b self,
         digit: Digit,
         yaw: Option<f32>,
-        obstacles: &'a [Obstacle],
-    ) -> Closing<'a> {
+        obstacles: &'b [Obstacle],
+    ) -> Closing<'b> {
         let mut flexing = self.shape.flexing(self.rig, digit);
         flexing.base_yaw = yaw.unwrap_or(flexing.base_yaw);
         let rest_overlaps = self.rig.rest_overlaps.as_deref();
@@ -114,9 +130,6 @@ impl Closer<'_> {
 
     /// Closes the fingers that the shape closes. A finger that is blocked or comes too close to a forbidden surface
     /// holds nothing.
-    ///
-    /// # Errors
-    /// No finger touches the object, or the stop signal came.
     pub(super) fn close_fingers(
         &self,
         thumb: ClosedDigit,
@@ -163,8 +176,7 @@ impl Closer<'_> {
         touching
     }
 
-    /// A relaxed pose for a digit that holds nothing; where that is too close to a barrier, tucked away or nearly
-    /// straight.
+    /// A relaxed pose for a digit that holds nothing; where that is too close to a barrier, tucked away or nearly straight.
     fn rest(&self, digit: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
         let closing = self.closing(digit, None, obstacles);
         let relaxed = closing.relax(flexion);
@@ -300,13 +312,7 @@ fn with_digit_away(
     barriers: Barriers<'_>,
     obstacles: &[Obstacle],
 ) -> Option<HandPose> {
-    let closer = Closer {
-        scene,
-        barriers,
-        rig,
-        shape: &HandShape::ALL_CLOSE,
-        object_from_wrist: pose.frame_from_wrist,
-    };
+    let closer = Closer::of_pose(scene, rig, barriers, &HandShape::ALL_CLOSE, pose);
     let present = pose.digits[digit.index()];
     let AngleRange { min, max } = rig.digit(digit).limits.base_yaw;
     let other_yaws = THUMB_YAWS.map(|share| min + (max - min) * share);

@@ -48,15 +48,13 @@ const HOOKED: &[f32] = &[1.0, 0.92, 0.84, 0.76, 0.65];
 const LESS_BENT: [f32; 5] = [1.0, 0.93, 0.85, 0.7, 0.5];
 const MORE_BENT: f32 = 1.15;
 
-/// Above this gap, in metres, a lower bound replaces the exact gap. Smaller values take more steps of a few
-/// nanoseconds each, larger ones more mesh queries.
+/// Above this gap, in metres, a lower bound replaces the exact gap.
 pub(super) const COARSE_GAP: f32 = 0.004;
 
 /// Largest distance of a closest-point query on the mesh, in metres. Shorter queries are faster.
 pub(super) const SEARCH_DISTANCE: f32 = 0.015;
 
-/// Limit on the steps of one advancement. Links gliding along a surface need many; a link that has not arrived by
-/// then stops where it is, which is free.
+/// Limit on the steps of one advancement.
 pub(super) const MAX_STEPS: usize = 120;
 
 /// A digit after closing.

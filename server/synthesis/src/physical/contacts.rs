@@ -30,18 +30,13 @@ const FACE_NORMAL_COS: f32 = 0.9962;
 /// Distance from a touch within which triangles meet there, in metres: its coordinates are rounded.
 const MEETING: f32 = 1e-6;
 
-/// Smallest distance between contacts of the palm, in metres: its solids overlap, and several touch with the same
-/// patch of skin. Fewer contacts let the palm pivot, more cost time in the immobility checks.
+/// Smallest distance between contacts of the palm, in metres: its solids overlap, and several touch with the same patch of skin.
 const PALM_SPACING: f32 = 0.015;
 
-/// Largest distance of a palm contact from the palm described by the joints' radii, in metres. Flesh farther out,
-/// such as the ball of the little finger, yields before it bears, and a client that draws the hand from its radii
-/// would see that contact in the air.
+/// Largest distance of a palm contact from the palm described by the joints' radii, in metres.
 const PALM_SLACK: f32 = 0.0015;
 
-/// Cosine of the largest angle between the direction to the palm's bone and the direction in which one of its solids
-/// presses. Skin that lies deeper in an overlapping solid belongs to that one. Larger angles tilt contact normals,
-/// smaller ones drop contacts where solids blend.
+/// Cosine of the largest angle between the direction to the palm's bone and the direction in which one of its solids presses.
 const PALM_PRESS_COS: f32 = 0.985;
 
 /// Replaces `contacts` by those of the touching digits and of the palm, thumb first and palm last. `pose` must be the

@@ -46,8 +46,7 @@ pub const GIVER_CLEARANCE: f32 = 0.001;
 /// thicker than the solids.
 pub const FORBIDDEN_CLEARANCE: f32 = 0.003;
 
-/// Share of the required closure, by an upper bound, from which a rejected hand is a near miss. Hands with less say
-/// little about their neighbourhood.
+/// Share of the required closure, by an upper bound, from which a rejected hand is a near miss.
 const NEAR_MISS_SHARE: f32 = 0.3;
 
 /// A hand closed on an object.
@@ -316,8 +315,7 @@ impl Gripper {
         epsilon / scene.required_epsilon(&TorqueScale::of(&self.soft_contacts))
     }
 
-    /// After a rejected hand: an upper bound of its closure as a share of the required one, if that makes it a near
-    /// miss.
+    /// After a rejected hand: an upper bound of its closure as a share of the required one, if that makes it a near miss.
     pub(crate) fn near_miss(&self) -> Option<f32> {
         (NEAR_MISS_SHARE..1.0)
             .contains(&self.closure_share)

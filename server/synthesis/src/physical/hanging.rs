@@ -41,8 +41,7 @@ const MIN_FINGERS: usize = 2;
 /// Cosine of the largest angle from the vertical at which a finger's push counts as from below.
 const FROM_BELOW_COS: f32 = 0.6;
 
-/// Weight of the middle of the contacts against their lines of action, in finding what a load hangs by. It decides only
-/// where the lines are parallel, as under a flat strap.
+/// Weight of the middle of the contacts against their lines of action, in finding what a load hangs by.
 const TOWARD_MIDDLE: f32 = 0.002;
 
 /// How a load hangs in bent fingers.

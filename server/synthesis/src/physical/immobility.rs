@@ -1,10 +1,9 @@
 //! Immobility: contact forces that hold the object, and closure.
 //!
-//! A wrench is six dimensionless numbers: force, and torque about the middle of the contacts divided by half their span,
-//! so that units do not weight one against the other (the thesis mixes newtons and newton metres, Eq. 4.5), and so that
-//! parts of the object that are far from the hand change nothing. Contacts are soft fingers with exact, curved friction limits. Both solvers query those limits
-//! only for the wrench that reaches farthest in a direction; whatever they build lies inside the true limits, so
-//! every answer is conservative.
+//! A wrench is six dimensionless numbers: force, and torque about the middle of the contacts divided by half their span, so that
+//! units do not weight one against the other (the thesis mixes newtons and newton metres, Eq. 4.5). Contacts are soft fingers with
+//! exact, curved friction limits. Both solvers query those limits only for the wrench that reaches farthest in a direction; all
+//! they build lies inside the true limits, so every answer is conservative.
 //!
 //! - [`balance()`]: forces that hold the object against gravity, as comfortably as possible (non-negative least squares
 //!   after Lawson and Hanson, over cones instead of a matrix);
@@ -154,8 +153,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
-/// Bisection steps in [`ContactCone::best_push_at_price`], down to a ten-millionth of the friction; the gain changes
-/// by less. Fewer steps end the search for forces early.
+/// Bisection steps in [`ContactCone::best_push_at_price`], down to a ten-millionth of the friction; the gain changes by less.
 const HALVINGS: usize = 24;
 
 /// A contact's friction limits, prepared for queries. Everything is per newton of normal force.
@@ -191,7 +189,7 @@ struct ContactDirection {
 }
 
 impl ContactCone {
-    pub(super) fn new(contact: &SoftContact, load: &Load) -> Self {
+    fn new(contact: &SoftContact, load: &Load) -> Self {
         let TorqueScale { centre, length } = load.torque_scale;
         let length = f64::from(length);
         Self {
@@ -316,6 +314,17 @@ impl ContactCone {
             torsion: 0.0,
         }
     }
+}
+
+/// The contacts' friction limits in a buffer.
+fn prepared_cones<'a>(
+    contacts: &[SoftContact],
+    load: &Load,
+    cones: &'a mut Vec<ContactCone>,
+) -> &'a [ContactCone] {
+    cones.clear();
+    cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
+    cones
 }
 
 /// The support function of the hull of unit wrenches: the wrench, over all contacts with one newton of normal force

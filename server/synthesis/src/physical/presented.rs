@@ -19,9 +19,7 @@ use crate::{
     },
 };
 
-/// Smallest Ferrari-Canny epsilon of a valid grasp, without unit, for objects that fingers reach around. In
-/// simulation, grasps above 0.02 did not fall, and half of them resisted pulls in all directions. Higher values give
-/// firmer but fewer grasps.
+/// Smallest Ferrari-Canny epsilon of a valid grasp, without unit, for objects that fingers reach around.
 const MIN_EPSILON: f32 = 0.02;
 
 /// Required share of the best epsilon that a thin part allows: only friction at its radius keeps a rod from rolling,

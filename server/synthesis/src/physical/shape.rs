@@ -14,16 +14,14 @@ use crate::{
     },
 };
 
-/// Total flexion of a relaxed finger in radians: about 25° in each of the first two joints and two thirds of that in
-/// the last.
+/// Total flexion of a relaxed finger in radians: about 25° in each of the first two joints and two thirds of that in the last.
 const RESTING_FLEXION: f32 = 1.15;
 
 /// Bounds of the total flexion of an idle finger next to straighter or more bent ones, in radians.
 const MIN_RESTING_FLEXION: f32 = 0.5 * RESTING_FLEXION;
 const MAX_RESTING_FLEXION: f32 = 1.5 * RESTING_FLEXION;
 
-/// Total flexion aimed at by tucked fingers, in radians: about nine tenths of full closure. The palm stops them
-/// earlier.
+/// Total flexion aimed at by tucked fingers, in radians: about nine tenths of full closure.
 pub(super) const TUCKED_FLEXION: f32 = 3.8;
 
 /// The shape an attempt draws: thumb yaw, finger spread, bend ratios, and which digits close. Fingers share one
@@ -166,8 +164,7 @@ impl Proposal {
         self.perturbed_about(self.object_from_wrist.position, PERTURBATION, stream)
     }
 
-    /// [`Proposal::perturbed`], turned about `pivot` (object frame) and shifted, with given limits in metres and
-    /// radians.
+    /// [`Proposal::perturbed`], turned about `pivot` (object frame) and shifted, with given limits in metres and radians.
     #[must_use]
     pub(crate) fn perturbed_about(
         &self,

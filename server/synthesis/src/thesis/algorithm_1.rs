@@ -63,9 +63,6 @@ impl ThesisAttempt {
 
     /// `TRYSYNTHESIZEGRASP`. `place_wrist` performs step 1 through [`ThesisScene::placer`] or another source of wrist
     /// frames. `stop` is asked about every 50 µs.
-    ///
-    /// # Errors
-    /// The first failed check, or the stop.
     pub(crate) fn try_synthesize_grasp(
         &mut self,
         scene: &ThesisScene<'_>,

@@ -270,8 +270,7 @@ pub fn missing_contacts(strategy: Strategy, posed: &[PosedDigit]) -> Option<Reje
 /// `angleStep` of Algorithm 4 in degrees (thesis 4.4). A larger step closes faster but penetrates the object deeper.
 const ANGLE_STEP_DEGREES: f32 = 5.0;
 
-/// Distance of a touch segment from the bone, as a share of the link's diameter W: 0.5 is on the skin. The thesis prints
-/// the full width, which is W/2 off the skin of its Eq. 4.1.
+/// Distance of a touch segment from the bone, as a share of the link's diameter W: 0.5 is on the skin.
 const TOUCH_OFFSET_SHARE: f32 = 0.5;
 
 /// Margin in metres by which something must be out of reach to be culled: well above rounding error.

@@ -4,10 +4,7 @@
 //! Follows the thesis as printed: the friction cone has the half-angle cos⁻¹ μ, and the angle of Eq. 4.5 is between
 //! six-vectors that mix newtons and newton metres, so torque hardly counts.
 
-use std::{
-    f32::consts::PI,
-    ops::{AddAssign, Mul},
-};
+use std::{f32::consts::PI, ops::Mul};
 
 use glam::Vec3;
 
@@ -141,8 +138,7 @@ impl ImmobilityBuffers {
     }
 }
 
-/// Range of the uniform factor on each share (Algorithm 10 says only "random noise"). A wider range covers more
-/// distributions, but fewer tries land near the comfortable one.
+/// Range of the uniform factor on each share (Algorithm 10 says only "random noise").
 const SHARE_NOISE: [f32; 2] = [0.5, 1.5];
 
 /// Force magnitudes for the four unit wrenches of each contact.
@@ -170,8 +166,9 @@ impl ForceDistribution {
     pub fn summed_wrench(&self, unit_wrenches: &[[Wrench; 4]]) -> Wrench {
         let mut sum = Wrench::default();
         for (magnitudes, wrenches) in self.magnitudes.iter().zip(unit_wrenches) {
-            for (&magnitude, &wrench) in magnitudes.iter().zip(wrenches) {
-                sum += wrench * magnitude;
+            for (&magnitude, wrench) in magnitudes.iter().zip(wrenches) {
+                sum.force += wrench.force * magnitude;
+                sum.torque += wrench.torque * magnitude;
             }
         }
         sum
@@ -199,8 +196,7 @@ pub fn contact_counts(contacts: &[Contact]) -> [u32; 5] {
     })
 }
 
-/// γ of Algorithm 8 in metres ("a small value"): offset of the friction cone's apex from the surface along the normal. A
-/// larger one widens the contact area that the four forces represent.
+/// γ of Algorithm 8 in metres ("a small value"): offset of the friction cone's apex from the surface along the normal.
 const CONE_OFFSET: f32 = 0.003;
 
 /// A force and its torque about the centre of mass: W = (F, p × F).
@@ -213,14 +209,6 @@ pub struct Wrench {
 }
 
 impl Wrench {
-    /// Wrench of a force acting at `anchor`, in metres relative to the centre of mass.
-    fn of_force(force: Vec3, anchor: Vec3) -> Self {
-        Self {
-            force,
-            torque: anchor.cross(force),
-        }
-    }
-
     /// Wrench of gravity on a mass in kilograms. It acts at the centre of mass and has no torque.
     pub fn of_gravity(mass: f32, up: Vec3) -> Self {
         Self {
@@ -247,13 +235,6 @@ impl Wrench {
         } else {
             -1.0
         }
-    }
-}
-
-impl AddAssign for Wrench {
-    fn add_assign(&mut self, other: Self) {
-        self.force += other.force;
-        self.torque += other.torque;
     }
 }
 
@@ -285,7 +266,11 @@ pub fn four_unit_wrenches(contact: &Contact, centre_of_mass: Vec3, cone_cos: f32
     let cone_sin = (1.0 - cone_cos * cone_cos).max(0.0).sqrt();
     let cone_origin = contact.position - centre_of_mass - inward * CONE_OFFSET;
     [right, forward, -right, -forward].map(|across| {
-        let direction = inward * cone_cos + across * cone_sin;
-        Wrench::of_force(direction, cone_origin + direction * CONE_OFFSET)
+        let force = inward * cone_cos + across * cone_sin;
+        let anchor = cone_origin + force * CONE_OFFSET;
+        Wrench {
+            force,
+            torque: anchor.cross(force),
+        }
     })
 }

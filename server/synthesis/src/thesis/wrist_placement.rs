@@ -22,8 +22,7 @@ use crate::{
 /// rounding error, so that no placement is pruned that the exact measures accept.
 const BOUND_SLACK: f32 = 1e-5;
 
-/// Positions drawn between two checks of the stop signal, which are some microseconds apart. More make stopping slower,
-/// fewer make searching slower.
+/// Positions drawn between two checks of the stop signal, which are some microseconds apart.
 const DRAWS_PER_STOP_CHECK: u32 = 256;
 
 /// A placed wrist: the frame F0 in the object's frame, as a pose and a matrix.

@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 use serde::Deserialize;
 
 use super::{
-    DigitAngles, Handedness,
+    Digit, DigitAngles, Handedness,
     joints::JOINT_NAMES,
     kinematics::digit_frames,
     rig::{AngleRange, DigitLimits, DigitRig, Rig},
@@ -24,29 +24,13 @@ pub struct RigDescription {
     /// The centre of the palm's skin, in metres.
     pub palm_m: [f32; 3],
     /// The digit chains.
-    pub digits: DigitDescriptions,
+    pub digits: BTreeMap<Digit, DigitDescription>,
     /// The proximal ends of the metacarpals of index, middle, ring and little finger, in metres.
     pub finger_metacarpals_m: [[f32; 3]; 4],
     /// The ten collision segments under the palm's skin: both ends of each, in metres.
     pub palm_segments_m: [[[f32; 3]; 2]; 10],
     /// Distance from joint to skin, in metres, by the joint's `WebXR` name or "palm".
     pub joint_radii_m: BTreeMap<String, f32>,
-}
-
-/// The digits by name.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DigitDescriptions {
-    /// The thumb.
-    pub thumb: DigitDescription,
-    /// The index finger.
-    pub index: DigitDescription,
-    /// The middle finger.
-    pub middle: DigitDescription,
-    /// The ring finger.
-    pub ring: DigitDescription,
-    /// The little finger.
-    pub little: DigitDescription,
 }
 
 /// One digit chain.
@@ -71,16 +55,9 @@ impl RigDescription {
     /// Builds the rig; its reach is measured on the stretched middle finger.
     ///
     /// # Panics
-    /// A joint has no radius.
+    /// A digit is missing, or the radius of a joint.
     pub fn to_rig(&self) -> Rig {
-        let DigitDescriptions {
-            thumb,
-            index,
-            middle,
-            ring,
-            little,
-        } = &self.digits;
-        let digits = [thumb, index, middle, ring, little].map(DigitDescription::to_digit);
+        let digits = Digit::ALL.map(|digit| self.digits[&digit].to_digit());
         let stretched = digit_frames(&digits[2], Pose::IDENTITY, DigitAngles::default());
         Rig {
             name: self.name.clone(),

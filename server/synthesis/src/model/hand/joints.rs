@@ -190,8 +190,7 @@ pub struct Skin {
     pub bind: HandJoints,
 }
 
-/// Largest factor by which a digit's thickness may change relative to the hand's size. It limits errors of trackers,
-/// which disagree on what a joint's radius is.
+/// Largest factor by which a digit's thickness may change relative to the hand's size.
 const MAX_THICKNESS_CHANGE: f32 = 1.35;
 
 /// Shorter lengths count as zero, in metres.
@@ -265,25 +264,25 @@ fn joint_scale(bind: &HandJoints, target: &HandJoints, joint: usize, size: f32) 
     Vec3::new(across, across, along)
 }
 
-/// A joint's frame, turned by [`bone_aligned`].
+/// A joint's frame after the smallest rotation that aligns its -Z axis with its bone. Trackers report metacarpals up to 15
+/// degrees off their bones, which would tear the fingers off the palm.
 fn bone_frame(hand: &HandJoints, joint: usize) -> Pose {
-    Pose {
-        position: hand.joints[joint].pose.position,
-        orientation: bone_aligned(hand, joint),
-    }
-}
-
-/// A joint's orientation after the smallest rotation that aligns its -Z axis with its bone. Trackers report
-/// metacarpals up to 15 degrees off their bones, which would tear the fingers off the palm.
-fn bone_aligned(hand: &HandJoints, joint: usize) -> Quat {
-    let orientation = hand.joints[joint].pose.orientation;
+    let Pose {
+        position,
+        orientation,
+    } = hand.joints[joint].pose;
     let bone = bone(hand, joint);
     let keeps_own = joint == index::WRIST || joint == index::PALM || index::TIP_OF_DIGIT.contains(&joint);
-    if keeps_own || bone.length() < MIN_LENGTH {
-        return orientation;
+    let turn = if keeps_own || bone.length() < MIN_LENGTH {
+        None
+    } else {
+        let forward = orientation * Vec3::NEG_Z;
+        Some(Quat::from_rotation_arc(forward, bone.normalize_or(forward)))
+    };
+    Pose {
+        position,
+        orientation: turn.map_or(orientation, |turn| turn * orientation),
     }
-    let forward = orientation * Vec3::NEG_Z;
-    Quat::from_rotation_arc(forward, bone.normalize_or(forward)) * orientation
 }
 
 /// Distance from the wrist to the knuckle of the middle finger, in metres.

@@ -181,18 +181,14 @@ fn turn(centre: Vec3, axis: Vec3, points: impl Iterator<Item = (Vec3, Vec3)>) ->
 
 /// The angle of a range that is nearest on the circle: the sum of squares grows with the angle between them.
 fn nearest_within(angle: f32, range: AngleRange) -> f32 {
-    use std::f32::consts::{PI, TAU};
+    use std::f32::consts::TAU;
     let wrapped = angle - TAU * (angle / TAU).round();
     if range.contains(wrapped, 0.0) {
         return wrapped;
     }
     let apart = |bound: f32| {
         let difference = (wrapped - bound).abs() % TAU;
-        if difference > PI {
-            TAU - difference
-        } else {
-            difference
-        }
+        difference.min(TAU - difference)
     };
     if apart(range.min) <= apart(range.max) {
         range.min

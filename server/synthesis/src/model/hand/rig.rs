@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::Deserialize;
 
-use super::{Digit, DigitAngles, Handedness, Phalanx, joints::index};
+use super::{Digit, DigitAngles, Handedness, joints::index};
 use crate::{base::pose::Pose, geometry::Segment};
 
 /// A closed range of angles, in radians.
@@ -229,11 +229,6 @@ impl Rig {
             own[finger.index()] = true;
         }
         own
-    }
-
-    /// Length of a link, in metres.
-    pub fn length(&self, digit: Digit, phalanx: Phalanx) -> f32 {
-        self.digits[digit.index()].lengths[phalanx.index()]
     }
 
     /// Its numbers as little-endian bytes: everything but the name, which does not affect grips. Equal rigs have equal bytes.

@@ -66,7 +66,7 @@ impl Gripper {
             return Err(Rejection::PalmCollision);
         }
         let shape = shape_of(pose);
-        let closer = closer(scene, rig, barriers, &shape, pose);
+        let closer = Closer::of_pose(scene, rig, barriers, &shape, pose);
         let digits = match digits {
             PosedDigits::Settled => self.settle(&closer, pose),
             PosedDigits::Still => Some(as_posed(scene, rig, pose, &still)),
@@ -92,7 +92,7 @@ impl Gripper {
             return Some(Misfit::Palm(-deepest));
         }
         let shape = shape_of(pose);
-        let closer = closer(scene, rig, Barriers::NONE, &shape, pose);
+        let closer = Closer::of_pose(scene, rig, Barriers::NONE, &shape, pose);
         let is_inside = still
             .iter()
             .any(|part| comes_within(part, surface, -MAX_PENETRATION));
@@ -127,23 +127,6 @@ impl Gripper {
             }
         }
         Some(digits)
-    }
-}
-
-/// What closes the digits of a posed hand.
-fn closer<'a>(
-    scene: &'a ObjectScene<'a>,
-    rig: &'a Rig,
-    barriers: Barriers<'a>,
-    shape: &'a HandShape,
-    pose: &HandPose,
-) -> Closer<'a> {
-    Closer {
-        scene,
-        barriers,
-        rig,
-        shape,
-        object_from_wrist: pose.frame_from_wrist,
     }
 }
 

@@ -4,6 +4,7 @@ use super::{
     Balance, Buffers, ContactCone, FrictionUse, Load, MAX_CONTACTS, ScaledWrench, SoftContact, TorqueScale,
     UnitPush, dot,
     least_squares::{Column, ConicLeastSquares},
+    prepared_cones,
 };
 use crate::model::grasp::{COMFORTABLE_SHARES, GRAVITY};
 
@@ -19,36 +20,26 @@ pub const BALANCE_TOLERANCE: f32 = 0.02;
 /// keep a margin (Westling and Johansson 1984), and a released object may be pushed.
 const FIRMNESS: f64 = 5.0;
 
-/// Part of the firm force that does not depend on the weight, in newtons: even a 20 g scalpel is held as firmly as a
-/// pen. Twice as much makes thin objects turn out of the hand.
+/// Part of the firm force that does not depend on the weight, in newtons: even a 20 g scalpel is held as firmly as a pen.
 const BASE_GRIP_FORCE: f64 = 8.0;
 
 /// The firm sum puts no digit beyond this share of [`MAX_CONTACT_FORCE`]: people do not grip at full strength.
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
-/// Share of friction and torsion of [`FrictionUse::Low`]: twice the load does not slip either.
-const LOW_SHARE: f64 = 0.45;
+/// Usable shares of friction and torsion, by [`FrictionUse`]: twice the load does not slip either, one and a half times the load
+/// holds, and all, less what rounding to single precision may add.
+const SHARES: [f64; 3] = [0.45, 0.7, 1.0 - 2e-6];
 
-/// Share of [`FrictionUse::Moderate`]: one and a half times the load holds.
-const MODERATE_SHARE: f64 = 0.7;
-
-/// Share of [`FrictionUse::Full`]: all, less what rounding to single precision may add.
-const FULL_SHARE: f64 = 1.0 - 2e-6;
-
-/// Digits press firmly from this share of the firm sum. Larger values spend friction on the last newtons; smaller
-/// ones hold thin objects by a few tenths of a newton, from which they creep.
+/// Digits press firmly from this share of the firm sum.
 const FIRM_ENOUGH: f64 = 0.5;
 
 /// Weight of deviations from the comfortable shares (of the firm sum) against unbalanced wrench.
 const SHARE_WEIGHT: f64 = 0.04;
 
-/// Weight of missing firmness (as a share of the firm sum) against unbalanced wrench. Contacts that cannot press
-/// firmly in balance then lose at most half of this, the whole [`BALANCE_TOLERANCE`]. More would reject their forces,
-/// far less would drown in rounding.
+/// Weight of missing firmness (as a share of the firm sum) against unbalanced wrench.
 const FIRMNESS_WEIGHT: f64 = 0.04;
 
-/// Weight of a contact's force limit against unbalanced wrench: force beyond the limit costs about a thousand times
-/// as much.
+/// Weight of a contact's force limit against unbalanced wrench: force beyond the limit costs about a thousand times as much.
 const LIMIT_WEIGHT: f64 = 30.0;
 
 /// The search for any balance ends once the residual is below this share of [`BALANCE_TOLERANCE`].
@@ -111,9 +102,6 @@ pub fn balance_with(
 }
 
 /// [`balance`] or, if there is none, what comes close to it, with what it leaves unbalanced; takes longer.
-///
-/// # Panics
-/// As [`balance`].
 pub(crate) fn nearest_balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Balance {
     solved(contacts, load, (FrictionUse::Low, false), buffers)
 }
@@ -126,9 +114,7 @@ fn solved(
     buffers: &mut Buffers,
 ) -> Balance {
     let Buffers { cones, solvers, .. } = buffers;
-    cones.clear();
-    cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
-    let mut problem = Problem::new(contacts, load, cones);
+    let mut problem = Problem::new(contacts, load, prepared_cones(contacts, load, cones));
     problem.gives_up = gives_up;
     // Contacts with closure hold nearly any load.
     if let Some(found) = problem.lowest_friction_balance(least_use, solvers) {
@@ -296,7 +282,7 @@ impl<'a> Problem<'a> {
         }
         solver.reset(entries);
         let strength = (self.limit() + 1.0) * self.contacts.len() as f64;
-        let share = share(self.friction_use);
+        let share = SHARES[self.friction_use as usize];
         for contact in 0..self.limit_rows() {
             entries.fill(0.0);
             entries[WRENCH_ROWS + contact] = LIMIT_WEIGHT;
@@ -366,7 +352,7 @@ impl<'a> Problem<'a> {
         let unbalanced: ScaledWrench = std::array::from_fn(|k| residual[k]);
         // Once a contact's forces exceed its limit, each further newton has a price.
         let price = (-residual[WRENCH_ROWS + contact] * LIMIT_WEIGHT / self.limit()).max(0.0);
-        self.cones[contact].best_push_at_price(&unbalanced, share(self.friction_use), price)
+        self.cones[contact].best_push_at_price(&unbalanced, SHARES[self.friction_use as usize], price)
     }
 
     /// Gain of a push of each digit in the comfort rows.
@@ -465,15 +451,6 @@ fn needed_wrench(load: &Load) -> ScaledWrench {
     let arm = (load.centre_of_mass.as_dvec3() - centre.as_dvec3()) / f64::from(length);
     let torque = arm.cross(up);
     [up.x, up.y, up.z, torque.x, torque.y, torque.z]
-}
-
-/// Usable share of friction and torsion.
-fn share(friction_use: FrictionUse) -> f64 {
-    match friction_use {
-        FrictionUse::Low => LOW_SHARE,
-        FrictionUse::Moderate => MODERATE_SHARE,
-        FrictionUse::Full => FULL_SHARE,
-    }
 }
 
 fn exceeds_limit(balance: &Balance) -> bool {

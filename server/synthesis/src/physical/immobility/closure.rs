@@ -5,18 +5,16 @@
 //! (beneath and beyond). The plane of a new facet is the combination of the two planes at its ridge that contains the vertex; both
 //! factors are positive, so nothing cancels and rounding errors do not grow.
 
-use super::{Buffers, ContactCone, Load, ScaledWrench, SoftContact, dot, farthest_wrench};
+use super::{Buffers, ContactCone, Load, ScaledWrench, SoftContact, dot, farthest_wrench, prepared_cones};
 
 /// Relative error of [`epsilon`], which is a lower bound. Smaller values take longer: the polytope grows until it is
 /// that close.
 pub const EPSILON_TOLERANCE: f32 = 0.05;
 
-/// Steps of Gilbert's algorithm that look for an unresisted disturbance before a polytope is built. More steps reject
-/// more grasps early but slow down every grasp with closure.
+/// Steps of Gilbert's algorithm that look for an unresisted disturbance before a polytope is built.
 const GILBERT_STEPS: usize = 12;
 
-/// Limit on the facets built, some 1 ms of work; the bound reached by then is returned. Grasps need about 1,000; only
-/// grasps equally weak in very many directions need more.
+/// Limit on the facets built, some 1 ms of work; the bound reached by then is returned.
 const MAX_FACETS_MADE: usize = 10_000;
 
 /// Contacts that resist less than this in some direction have no closure: below it, single precision decides.
@@ -31,7 +29,7 @@ const NO_CLOSURE: f64 = 1e-6;
 /// With `required` above 0, the search ends as soon as epsilon cannot reach it, and the value is merely some number
 /// below `required`.
 pub fn epsilon(contacts: &[SoftContact], load: &Load, required: f32, buffers: &mut Buffers) -> f32 {
-    let resisted = least_resisted(model(contacts, load, &mut buffers.cones));
+    let resisted = least_resisted(prepared_cones(contacts, load, &mut buffers.cones));
     let required = f64::from(required);
     if resisted <= NO_CLOSURE {
         return 0.0;
@@ -44,14 +42,7 @@ pub fn epsilon(contacts: &[SoftContact], load: &Load, required: f32, buffers: &m
 
 /// An upper bound of [`epsilon`], in a tenth of the time; 0 if there is certainly no closure.
 pub fn epsilon_upper_bound(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> f32 {
-    least_resisted(model(contacts, load, &mut buffers.cones)) as f32
-}
-
-/// The contacts as cones.
-fn model<'a>(contacts: &[SoftContact], load: &Load, cones: &'a mut Vec<ContactCone>) -> &'a [ContactCone] {
-    cones.clear();
-    cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
-    cones
+    least_resisted(prepared_cones(contacts, load, &mut buffers.cones)) as f32
 }
 
 /// An upper bound of epsilon, 0 if there is certainly no closure. Gilbert's algorithm (1966) walks to the point of
@@ -105,7 +96,7 @@ fn inscribed_sphere(cones: &[ContactCone], upper: f64, required: f64, polytope: 
             return upper;
         }
         let near = lower >= (1.0 - f64::from(EPSILON_TOLERANCE)) * upper;
-        if near || polytope.facets_made() > MAX_FACETS_MADE || !polytope.expand(facet, wrench) {
+        if near || polytope.made > MAX_FACETS_MADE || !polytope.expand(facet, wrench) {
             // Rounding must not lift the result above the upper bound.
             return lower.clamp(0.0, upper);
         }
@@ -115,8 +106,7 @@ fn inscribed_sphere(cones: &[ContactCone], upper: f64, required: f64, polytope: 
 /// Numbers in a wrench.
 const DIMENSIONS: usize = 6;
 
-/// A vertex sees a facet if it is farther than this outside. Wrenches are of order one and rounding is far below; a
-/// facet kept by mistake is off by no more than this.
+/// A vertex sees a facet if it is farther than this outside.
 const OUTSIDE: f64 = 1e-10;
 
 /// A hull thinner than this in some direction has no volume.
@@ -144,8 +134,7 @@ pub(super) struct Polytope {
     /// Facets built so far, including removed ones.
     made: usize,
     facets: Vec<Facet>,
-    /// Signed distance of each facet's plane from the origin: negative if the origin is outside, infinite for removed
-    /// facets.
+    /// Signed distance of each facet's plane from the origin: negative if the origin is outside, infinite for removed facets.
     offsets: Vec<f64>,
     removed: Vec<u32>,
     removing: Vec<u32>,
@@ -156,7 +145,7 @@ pub(super) struct Polytope {
 impl Polytope {
     /// Starts with a simplex of seven points, support points that `farthest` returns for seven directions. Returns
     /// false if all points lie in a hyperplane.
-    pub(super) fn start(&mut self, farthest: impl Fn(&ScaledWrench) -> (f64, ScaledWrench)) -> bool {
+    fn start(&mut self, farthest: impl Fn(&ScaledWrench) -> (f64, ScaledWrench)) -> bool {
         let mut corners = [[0.0; DIMENSIONS]; DIMENSIONS + 1];
         corners[0] = farthest(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).1;
         // An orthonormal basis of the directions spanned so far.
@@ -204,7 +193,7 @@ impl Polytope {
     }
 
     /// The facet whose plane is nearest to the origin, or farthest beyond it if the origin is outside.
-    pub(super) fn nearest_facet(&self) -> u32 {
+    fn nearest_facet(&self) -> u32 {
         let mut nearest = (f64::INFINITY, 0);
         for (index, &offset) in self.offsets.iter().enumerate() {
             if offset < nearest.0 {
@@ -215,18 +204,13 @@ impl Polytope {
     }
 
     /// Outward unit normal of a facet and its signed distance from the origin.
-    pub(super) fn plane(&self, facet: u32) -> (ScaledWrench, f64) {
+    fn plane(&self, facet: u32) -> (ScaledWrench, f64) {
         (self.facets[facet as usize].normal, self.offsets[facet as usize])
-    }
-
-    /// Facets built since the start: a measure of cost.
-    pub(super) fn facets_made(&self) -> usize {
-        self.made
     }
 
     /// Adds a vertex outside `facet`. Returns false if it is not outside, or if rounding has broken the surface,
     /// after which the polytope must not be used.
-    pub(super) fn expand(&mut self, facet: u32, vertex: ScaledWrench) -> bool {
+    fn expand(&mut self, facet: u32, vertex: ScaledWrench) -> bool {
         let height = dot(&self.facets[facet as usize].normal, &vertex) - self.offsets[facet as usize];
         if height <= OUTSIDE {
             return false;
@@ -271,8 +255,7 @@ impl Polytope {
         true
     }
 
-    /// Creates the facet at the ridge of facet `removing`, opposite its vertex `ridge`, that borders on
-    /// facet `remaining`.
+    /// Creates the facet at the ridge of facet `removing`, opposite its vertex `ridge`, that borders on facet `remaining`.
     fn create(&mut self, removing: u32, ridge: usize, remaining: u32, name: u32) {
         let (from, to) = (&self.facets[removing as usize], &self.facets[remaining as usize]);
         let (a, b) = ((-to.height).max(0.0), from.height);
@@ -368,8 +351,7 @@ fn orthonormalised(vector: ScaledWrench, basis: &[ScaledWrench]) -> ScaledWrench
     rest.map(|x| x / length)
 }
 
-/// A unit vector orthogonal to an orthonormal basis that does not span everything, from the axis that the basis
-/// covers least.
+/// A unit vector orthogonal to an orthonormal basis that does not span everything, from the axis that the basis covers least.
 fn perpendicular(basis: &[ScaledWrench]) -> ScaledWrench {
     let covered = |k: usize| basis.iter().map(|axis| axis[k] * axis[k]).sum::<f64>();
     let mut least = 0;

@@ -83,9 +83,6 @@ impl<const FOURS: usize> Default for ConicLeastSquares<FOURS> {
 
 impl<const FOURS: usize> ConicLeastSquares<FOURS> {
     /// Starts over with a new target and no columns.
-    ///
-    /// # Panics
-    /// `target` has more rows than fit.
     pub(super) fn reset(&mut self, target: &[f64]) {
         self.rows = target.len();
         self.columns.clear();

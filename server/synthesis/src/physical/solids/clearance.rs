@@ -129,15 +129,15 @@ impl Parts {
             }
         }
         for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
-            let outer = digit.iter().enumerate().skip(1);
-            for (link, our) in outer.clone() {
-                for their in palm {
-                    visit([3 * i + link, PALM_PART], [our, their]);
-                }
-            }
-            for (link, our) in outer.filter(|_| i > 0) {
-                for their in thenar {
-                    visit([3 * i + link, THUMB_BALL_PART], [our, their]);
+            let of_hand = [(PALM_PART, palm.as_slice()), (THUMB_BALL_PART, thenar.as_slice())];
+            let meetable = of_hand
+                .into_iter()
+                .filter(|&(part, _)| i > 0 || part == PALM_PART);
+            for (part, solids) in meetable {
+                for (link, our) in digit.iter().enumerate().skip(1) {
+                    for their in solids {
+                        visit([3 * i + link, part], [our, their]);
+                    }
                 }
             }
         }
@@ -226,8 +226,7 @@ impl Bounded {
     }
 }
 
-/// Tolerance of depths where a capsule's axis is inside the volume, in metres. Such a capsule is several times deeper
-/// than skin yields, so nothing depends on the rest; smaller values make hopeless hands expensive.
+/// Tolerance of depths where a capsule's axis is inside the volume, in metres.
 const DEEP_TOLERANCE: f32 = 1e-3;
 
 /// Upper bound on the error of gaps, in metres.

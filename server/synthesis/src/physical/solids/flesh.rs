@@ -23,8 +23,7 @@ use crate::{
 /// finger, and the two sides of the carpus.
 pub const PALM_SOLIDS: usize = 10;
 
-/// Solids that move with the thumb's metacarpal: the ball of the thumb, its root in the palm, and the web to the
-/// index finger.
+/// Solids that move with the thumb's metacarpal: the ball of the thumb, its root in the palm, and the web to the index finger.
 pub(crate) const THENAR_SOLIDS: usize = FLESH_SOLIDS - PALM_SOLIDS;
 
 /// Distance from wrist to middle knuckle of the fitted hand, in metres.
@@ -320,8 +319,7 @@ impl TrackedPalm {
         (a.lerp(b, share), a_radius + (b_radius - a_radius) * share)
     }
 
-    /// The palm behind the metacarpals and between their heads: from knuckle to knuckle, and from the wrist to the
-    /// bases.
+    /// The palm behind the metacarpals and between their heads: from knuckle to knuckle, and from the wrist to the bases.
     pub(super) fn around_metacarpals(&self) -> [TaperedCapsule; AROUND_METACARPALS] {
         let bones = &BONES[BONES.len() - AROUND_METACARPALS..];
         let mut solids = [TaperedCapsule::default(); AROUND_METACARPALS];

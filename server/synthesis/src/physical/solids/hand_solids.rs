@@ -151,6 +151,11 @@ impl HandSolids {
             .chain(&self.thenar)
             .chain(&self.forearm)
     }
+
+    /// All solids with their parts, in the order of [`HandSolids::iter`].
+    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &TaperedCapsule)> + Clone {
+        (0..).map(part_at).zip(self.iter())
+    }
 }
 
 /// The `OpenXR` joints at the ends of a digit's three links.
@@ -278,6 +283,11 @@ impl TrackedSolids {
             .chain(&self.tracked)
     }
 
+    /// All solids with their parts, in the order of [`TrackedSolids::iter`].
+    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &TaperedCapsule)> + Clone {
+        (0..).map(part_at).zip(self.iter())
+    }
+
     /// The solids that move with the wrist only.
     pub fn still(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
         self.palm.iter().chain(&self.hand.forearm).chain(&self.tracked)
@@ -328,24 +338,6 @@ impl fmt::Display for SolidPart {
             Self::ThumbBall => "ball of the thumb",
             Self::Forearm => "forearm",
         })
-    }
-}
-
-impl HandSolids {
-    /// All solids with their parts, in the order of [`HandSolids::iter`].
-    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &TaperedCapsule)> + Clone {
-        self.iter()
-            .enumerate()
-            .map(|(index, solid)| (part_at(index), solid))
-    }
-}
-
-impl TrackedSolids {
-    /// All solids with their parts, in the order of [`TrackedSolids::iter`].
-    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &TaperedCapsule)> + Clone {
-        self.iter()
-            .enumerate()
-            .map(|(index, solid)| (part_at(index), solid))
     }
 }
 

@@ -12,16 +12,13 @@ const LANES: usize = TrackedSolids::COUNT.next_multiple_of(8);
 /// Solids of the giver compared with one solid at once: one register of single precision.
 const GROUP: usize = 8;
 
-/// Solids compared with a group of spheres between checks for a decision. Fewer check more often, more compare in
-/// vain: a look-up takes a tenth longer with four, a fifth to a half longer with twenty.
+/// Solids compared with a group of spheres between checks for a decision.
 const SOLIDS_AT_ONCE: usize = 8;
 
-/// Solids behind the upper bounds on distance. With eight, looser bounds cause more exact comparisons and the search
-/// for the clearest hands takes a quarter longer; 24 gain nothing.
+/// Solids behind the upper bounds on distance.
 const BOUNDING_SOLIDS: usize = 16;
 
-/// Upper bound on the rounding error of distances within arm's reach, in metres. Decisions beyond it are certain; the
-/// others are left to exact distances.
+/// Upper bound on the rounding error of distances within arm's reach, in metres.
 const ROUNDING: f32 = 2e-6;
 
 /// One value per solid.
@@ -288,8 +285,7 @@ impl PreparedHand {
         Some(least)
     }
 
-    /// For each sphere, 1 if its centre is certainly within its reach of one of the [`SOLIDS_AT_ONCE`] solids from
-    /// `first`.
+    /// For each sphere, 1 if its centre is certainly within its reach of one of the [`SOLIDS_AT_ONCE`] solids from `first`.
     #[inline]
     fn near_group(&self, first: usize, spheres: &Spheres, reaches: &[f32; SPHERES]) -> [u32; SPHERES] {
         let mut nears = [0; SPHERES];
@@ -348,8 +344,7 @@ fn least_of(numbers: &Lanes) -> f32 {
     least.into_iter().fold(f32::INFINITY, f32::min)
 }
 
-/// Indices of [`TrackedSolids::iter`]. The first four find 93 % of the collisions of known grips and givers, the first
-/// eight 98 %.
+/// Indices of [`TrackedSolids::iter`].
 #[rustfmt::skip]
 pub(super) const COLLISION_ORDER: [usize; TrackedSolids::COUNT] = [
     2, 10, 4, 18, 8, 30, 14, 25, 11, 5, 3, 12, 29, 22, 1, 6, 15, 33, 26, 7,

@@ -153,7 +153,7 @@ impl Held {
             .iter()
             .map(|&(digit, phalanx, along)| {
                 let link = frames.digits[digit.index()].links[phalanx.index()];
-                link.transform_point(Vec3::Y * along * self.rig.length(digit, phalanx)) * 1e3
+                link.transform_point(Vec3::Y * along * self.rig.digit(digit).lengths[phalanx.index()]) * 1e3
             })
             .collect();
         let fitted = shape.fitted(&bones);
