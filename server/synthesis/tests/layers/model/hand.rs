@@ -81,7 +81,6 @@ fn openxr_axes_follow_the_specification() {
     }
 }
 
-#[test]
 /// Volume within a skin in cubic metres.
 fn volume(skin: &Skin, positions: Vec<Vec3>) -> f64 {
     let mesh = TriangleMesh::without_degenerates(positions, &skin.triangles);
@@ -185,4 +184,38 @@ fn fingers_that_the_rig_lacks_do_not_count() {
         fit.digits[Digit::Little.index()],
         three.stretched()[Digit::Little.index()]
     );
+}
+
+#[test]
+fn left_hands_mirror_right_hands() {
+    let mut random = Random::new(3);
+    let flip = |v: Vec3| v * Vec3::new(-1.0, 1.0, 1.0);
+    for name in ["thesis", "adult"] {
+        let (left, right) = (
+            built_in_hand(name, Handedness::Left),
+            built_in_hand(name, Handedness::Right),
+        );
+        for _ in 0..100 {
+            let digits = random.angles(&right.rig);
+            let wrist = random.pose();
+            let of_right = HandJoints::of_pose(&right.rig, &hand_pose(wrist, digits));
+            let of_left = HandJoints::of_pose(&left.rig, &hand_pose(wrist.mirrored_x(), digits));
+            for (l, r) in of_left.joints.iter().zip(&of_right.joints) {
+                assert!(l.pose.position.distance(flip(r.pose.position)) < 1e-5);
+                // Mirroring takes each axis to its image; in a right-handed frame, x then points the other way.
+                for (axis, sign) in [(Vec3::X, -1.0), (Vec3::Y, 1.0), (Vec3::Z, 1.0)] {
+                    let image = flip(r.pose.transform_vector(axis)) * sign;
+                    assert!(l.pose.transform_vector(axis).distance(image) < 1e-4);
+                }
+                assert_eq!(l.radius, r.radius);
+            }
+            let (skin_of_left, skin_of_right) = (left.skin.posed(&of_left), right.skin.posed(&of_right));
+            for (l, r) in skin_of_left.iter().zip(&skin_of_right) {
+                assert!(l.distance(flip(*r)) < 2e-5, "{l} is not the image of {r}");
+            }
+        }
+        for (l, r) in left.rig.palm_segments.iter().zip(&right.rig.palm_segments) {
+            assert!(l.start.distance(flip(r.start)) < 1e-6 && l.end.distance(flip(r.end)) < 1e-6);
+        }
+    }
 }

@@ -4,10 +4,11 @@ use grasp_synthesis::propose::{
     both_hands::Mirror,
     prepared::ROWS,
     proposal::Candidate,
-    success_prior::{INPUTS, MAX_DEVIATION, TRAINED, UNITS},
+    success_prior::{INPUTS, MAX_DEVIATION, ObjectFeatures, TRAINED, UNITS},
 };
 
 use crate::prelude::*;
+use grasp_synthesis::physical::shape::Proposal;
 
 #[test]
 fn mirror_image_of_a_hand_is_the_other_hand() {
