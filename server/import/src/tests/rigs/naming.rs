@@ -104,10 +104,13 @@ fn without_distal(names: &[String]) -> Value {
     json!({ "VRM": { "humanoid": { "humanBones": bones } } })
 }
 
+/// A program, its names of bones and its extensions.
+type Program = (&'static str, Name, fn(&[String]) -> Value);
+
 #[test]
 fn numbers_and_extensions_that_leave_out_bones_give_the_same_rig() {
     let none = Style::PLAIN.extensions;
-    let programs: [(&str, Name, fn(&[String]) -> Value); 13] = [
+    let programs: [Program; 13] = [
         ("four bones from the palm", numbered_from_palm, none),
         ("five bones from the palm", numbered_to_end, none),
         ("Auto-Rig Pro", auto_rig, none),
