@@ -2,6 +2,7 @@
 
 mod naming;
 mod odd_models;
+mod skins;
 
 use std::collections::HashSet;
 
