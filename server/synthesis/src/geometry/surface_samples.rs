@@ -1,6 +1,6 @@
 //! Points drawn evenly from a mesh's surface, and the thickness of its parts as they show.
 
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -128,16 +128,45 @@ const MIN_NEIGHBOURS: usize = 16;
 /// The thickness of the parts of a mesh around samples of its surface, each measured when it is first needed.
 #[derive(Clone, Debug, Default)]
 pub struct LocalThickness {
-    samples: Vec<(Vec3, OnceLock<f32>)>,
+    samples: Vec<(Vec3, Measured)>,
+}
+
+/// A thickness once it is measured, in four bytes. Whoever measures it finds the same.
+#[derive(Debug)]
+struct Measured(AtomicU32);
+
+impl Default for Measured {
+    fn default() -> Self {
+        Self(AtomicU32::new(f32::NAN.to_bits()))
+    }
+}
+
+impl Clone for Measured {
+    fn clone(&self) -> Self {
+        Self(AtomicU32::new(self.0.load(Ordering::Relaxed)))
+    }
+}
+
+impl Measured {
+    fn get_or(&self, measure: impl FnOnce() -> f32) -> f32 {
+        let known = f32::from_bits(self.0.load(Ordering::Relaxed));
+        if !known.is_nan() {
+            return known;
+        }
+        let measured = measure();
+        self.0.store(measured.to_bits(), Ordering::Relaxed);
+        measured
+    }
 }
 
 impl LocalThickness {
     /// Of a mesh with these points, which are spread evenly over it.
     pub fn of(samples: &[SurfaceSample]) -> Self {
         let samples = samples.iter();
-        let samples = samples.map(|sample| (sample.position, OnceLock::new()));
         Self {
-            samples: samples.collect(),
+            samples: samples
+                .map(|sample| (sample.position, Measured::default()))
+                .collect(),
         }
     }
 
@@ -153,7 +182,7 @@ impl LocalThickness {
         }
         let (_, nearest) = nearest;
         nearest.map_or(0.0, |(centre, measured)| {
-            *measured.get_or_init(|| self.measure(*centre))
+            measured.get_or(|| self.measure(*centre))
         })
     }
 
