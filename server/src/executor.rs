@@ -17,8 +17,8 @@ use crate::{
     limits::Places,
 };
 
-/// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond,
-/// unless its threads wait for a core. Less omits work from more answers, more takes longer from the deadline.
+/// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond
+/// unless its threads wait for a core.
 pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 
 /// When a rejected client should retry: after about the time of a few searches.
@@ -69,8 +69,8 @@ impl SearchExecutor {
     }
 }
 
-/// Runs work that can be stopped away from the threads of the async runtime. It is to stop when the returned future is dropped
-/// or its time is over.
+/// Runs stoppable work away from the threads of the async runtime. It is to stop when the returned future is dropped or its time is
+/// over.
 pub(crate) async fn run_stoppable<T: Send + 'static>(
     due: Option<Instant>,
     work: impl FnOnce(Stop<'_>) -> T + Send + 'static,
@@ -78,7 +78,7 @@ pub(crate) async fn run_stoppable<T: Send + 'static>(
     let waiting = Arc::new(());
     let waits = Arc::downgrade(&waiting);
     let work = run_blocking(move || work(Stop::when(&|| waits.strong_count() == 0)));
-    // When it is due, the work ends soon after; nobody waits for it.
+    // When it is due, the work ends soon; nobody waits for it.
     before(due, work).await?
 }
 

@@ -2,16 +2,18 @@
 //!
 //! [`run`] serves on a listener until it is shut down; the binary `grasp-server` adds flags, logs and signals.
 //!
-//! A request passes these modules: `call` records its arrival and deadline; `services` handles it; `validate` turns the
-//! message into checked values or a list of everything that is wrong; `objects` finds the object with its search
-//! structures, `rigs` the hands, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
-//! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages
-//! go through `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next.
-//! `budget` says how long a search may take, and how much of a deadline recent delays leave for it.
+//! A request passes these modules: `call` records its arrival and deadline; `services` handles it; `validate` turns the message
+//! into checked values or a list of all errors; `objects` finds the object with its search structures, `rigs` the hands, and
+//! `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and stops it when the call is
+//! dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages go through
+//! `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next. `budget` says how long a search
+//! may take, and how much of a deadline recent delays leave for it.
 //!
-//! `wire` has single values as the contract has them, `middleware` the form of layers around services. `web` lets pages in browsers call, and refuses those of other origins, and what is neither gRPC nor gRPC-Web.
+//! `wire` converts single values of the contract, `middleware` is the form of layers around services. `web` lets pages in browsers
+//! call, and refuses pages of other origins and protocols other than gRPC and gRPC-Web.
 //!
-//! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
+//! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
+//! contents.
 //!
 //! Before serving, `memory` compares the configured limits with those of the process, and `objects::directory` loads the folder
 //! of objects. Between calls, `atlases` builds atlases in the background.

@@ -38,7 +38,7 @@ pub struct StreamLimits {
 pub(crate) const BYTES_BESIDES_MESH: usize = 1 << 20;
 
 /// Largest request to `GraspService`, and to methods of `ObjectService` that build no object, in bytes. A hand of 26 joints takes
-/// about 2 kB, one of a mesh up to 110 kB.
+/// about 2 kB, a hand given as a mesh up to 110 kB.
 pub(crate) const MAX_FIND_REQUEST: usize = 160 << 10;
 
 /// Largest response of either service, in bytes. A full page of objects takes less than 1 MiB.
@@ -52,9 +52,9 @@ pub(crate) const MAX_PIECE: usize = 1 << 20;
 pub(crate) struct Places {
     limit: Limit,
     maximum: usize,
-    /// When a client that found none should try again.
+    /// When a client without a place should try again.
     retry_after: Duration,
-    /// For others who take some and wait for them.
+    /// For code that waits for places.
     pub free: Arc<Semaphore>,
 }
 
@@ -83,7 +83,7 @@ impl Places {
     }
 }
 
-/// The content of a mutex in whose locks no code leaves half a change when it panics.
+/// The content of a mutex, even of a poisoned one: no code leaves half a change when it panics.
 pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -155,7 +155,7 @@ fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
     let filtered = tracing_subscriber::registry().with(config.log.parse::<Targets>()?);
     let log = fmt::layer()
         .with_ansi(io::stderr().is_terminal())
-        // Where the log cannot be written, as to a terminal that was closed, neither can that; trying to would panic.
+        // Writing to a log that failed, such as a closed terminal, would panic.
         .log_internal_errors(false)
         .with_writer(io::stderr);
     match config.log_format {

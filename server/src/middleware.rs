@@ -1,4 +1,4 @@
-//! Layers of services, each written as a function of a request and of what passes it on, and filters of bodies.
+//! Layers of services, each written as a function of a request and the inner service, and filters of bodies.
 
 use std::{
     future::Future,
@@ -14,7 +14,7 @@ use tower::{Layer, Service};
 
 pub(crate) type Answer<E> = Pin<Box<dyn Future<Output = Result<Response<Body>, E>> + Send>>;
 
-/// What is done with the requests of services.
+/// A layer's handling of requests.
 pub(crate) trait Middleware<B>: Clone {
     /// Answers a request; `next` passes it to the services inside.
     fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
@@ -69,10 +69,10 @@ pub(crate) type PolledFrame = Poll<Option<Result<Frame<Bytes>, Status>>>;
 
 /// Watches or changes the frames of a body.
 pub(crate) trait FrameFilter: Send + Unpin + 'static {
-    /// Polls the next frame, from the body inside or of what is kept of it.
+    /// Polls the next frame, of the inner body or of those kept.
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame;
 
-    /// True if nothing is kept that is to follow the last frame of the body inside.
+    /// True if no kept frame follows the last frame of the inner body.
     fn is_empty(&self) -> bool {
         true
     }

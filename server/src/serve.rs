@@ -131,7 +131,7 @@ impl Gauges {
         self.0.calls.receiver_count()
     }
 
-    /// Number of created objects that searches need not prepare.
+    /// Number of created objects that are prepared for searches.
     pub fn prepared_objects(&self) -> usize {
         self.0.objects.prepared()
     }
@@ -320,7 +320,7 @@ impl Server {
         let origins = Arc::new(config.web_origins.clone());
         let is_web = *origins != WebOrigins::NONE;
         let serving = transport::Server::builder()
-            // Also where it is not served, to say so.
+            // Even without gRPC-Web, to tell its clients that it is off.
             .accept_http1(true)
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
             .http2_max_header_list_size(MAX_HEADERS as u32)
@@ -352,7 +352,7 @@ impl Server {
             .add_service(reflection().build_v1alpha()?)
             .serve_with_incoming_shutdown(incoming, stop.clone().cancelled_owned());
 
-        // Stops everything that still runs, however this function ends.
+        // Stops all tasks, however this function ends.
         let _builders_end = handler.atlases.stopper();
         let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();

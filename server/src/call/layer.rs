@@ -24,7 +24,7 @@ use crate::{
     net::{Reader, arriving},
 };
 
-/// Paths of the methods that build objects or rigs from large messages; only so many are received at a time.
+/// Methods that build objects or rigs from large messages. The number of such messages received at a time is bounded.
 const UPLOAD_METHODS: [&str; 4] = [
     "/grasp.v1.ObjectService/CreateObject",
     "/grasp.v1.ObjectService/UpdateObject",
@@ -32,18 +32,18 @@ const UPLOAD_METHODS: [&str; 4] = [
     "/grasp.v1.HandRigService/CreateRig",
 ];
 
-/// Path of the method whose request may take long to arrive. It limits its time itself.
+/// Path of the upload in pieces, which limits its own time.
 const STREAMED_UPLOAD: &str = "/grasp.v1.ObjectService/UploadObject";
 
-/// Paths of the methods that stream small messages, each of which is awaited: packing them would only delay them.
+/// Methods that stream small messages for which clients wait: packing would delay them.
 const AWAITED_STREAMS: [&str; 3] = [
     "/grasp.v1.GraspService/StreamGrasps",
     "/grasp.v1.GraspService/TrackHoldout",
     "/grasp.v1.ObjectService/WatchObjects",
 ];
 
-/// How long before its deadline a call is answered that nobody has answered. At the deadline the transport does so, without the
-/// framing and the headers that pages need.
+/// How long before its deadline an unanswered call ends. At the deadline the transport would end it, without the framing and the
+/// headers that pages need.
 const BEFORE_TRANSPORT: Duration = Duration::from_millis(1);
 
 /// True if a method takes large messages, once its call is admitted.
@@ -58,7 +58,7 @@ pub(crate) struct Calls {
     pub in_flight: watch::Sender<()>,
     /// One place per concurrent upload.
     pub uploads: Places,
-    /// How long nothing need arrive of an upload.
+    /// Longest pause in an upload.
     pub upload_grace: Duration,
     /// One permit per thread that packs messages.
     pub packers: Arc<Semaphore>,
@@ -71,7 +71,7 @@ pub(crate) struct Calls {
 }
 
 impl Calls {
-    /// When a call without an answer ends, and with what error.
+    /// When and with which error an unanswered call ends.
     fn end(&self, path: &str, context: &CallContext) -> Option<(Instant, ServiceError)> {
         let before = |deadline: Instant| deadline.checked_sub(BEFORE_TRANSPORT).unwrap_or(deadline);
         let due = context
@@ -105,7 +105,7 @@ impl Middleware<Body> for Calls {
         };
         let end = self.end(path, &context);
         let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads));
-        // What has a place needs no other bound.
+        // Beyond these bytes, an upload has a place and needs no other bound.
         let (largest, most_counted) = match upload {
             Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),
             None => (MAX_FIND_REQUEST, usize::MAX),
@@ -149,8 +149,8 @@ impl Middleware<Body> for Calls {
     }
 }
 
-/// The same service twice: with the bound on messages that methods for uploads have, and with that of all others. The bounds
-/// hold for unpacked messages, too.
+/// The same service twice: with the message limit of upload methods, and with that of all others. The limits hold for unpacked
+/// messages, too.
 #[derive(Clone, Debug)]
 pub(crate) struct BySize<S> {
     pub large: S,

@@ -29,7 +29,7 @@ use crate::{
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.
 const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
 
-/// What a handler knows about its call, and adds to the call's log line.
+/// Context of a call for its handler, which adds to the call's log line.
 #[derive(Clone, Debug)]
 pub(crate) struct CallContext {
     pub arrived: Instant,
@@ -38,7 +38,7 @@ pub(crate) struct CallContext {
     record: Arc<CallRecord>,
 }
 
-/// What a handler tells of its call; the first value of each stays.
+/// Values that a handler records about its call; the first of each stays.
 #[derive(Debug, Default)]
 struct CallRecord {
     object: OnceLock<String>,
@@ -50,23 +50,23 @@ struct CallRecord {
     ended: OnceLock<Instant>,
 }
 
-/// A search as it is logged.
+/// Log record of a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchSummary {
-    /// The outcome: its name in the contract, or what was found about a grasp or a holdout.
+    /// The outcome: its name in the contract, or the verdict on a grasp or a holdout.
     pub outcome: &'static str,
     pub attempts: u64,
     pub time: Duration,
 }
 
 impl CallContext {
-    /// The context of a request, which [`Calls`] gives to each.
+    /// The context of a request, set by [`Calls`].
     pub(crate) fn of<T>(request: &tonic::Request<T>) -> Self {
         let context = request.extensions().get().cloned();
         context.expect("every call has a context")
     }
 
-    /// The context of a part of the call that arrived at a time and is answered like a call of its own.
+    /// The context of a part of the call that arrived at `arrived` and is answered like a call of its own.
     pub(crate) fn of_part(&self, arrived: Instant) -> Self {
         Self {
             arrived,
@@ -91,8 +91,8 @@ impl CallContext {
         Some(deadline.checked_sub(BEFORE_DEADLINE).unwrap_or(deadline))
     }
 
-    /// Records when the search that starts now has to end. A time that has passed counts as now: what was waited before,
-    /// such as for the rest of a request, is no delay of the answer.
+    /// Records when the search that starts now has to end. A past time counts as now: earlier waiting, such as for the rest of a
+    /// request, is no delay of the answer.
     pub(crate) fn search_is_due(&self, due: Instant) {
         let _ = self.record.due.set(due.max(Instant::now()));
     }
@@ -106,7 +106,7 @@ impl CallContext {
         let _ = self.record.object.set(id.to_owned());
     }
 
-    /// Adds the part of the deadline that is kept for the answer to the log line, if there is a deadline.
+    /// Adds the part of the deadline reserved for the answer to the log line, if there is a deadline.
     pub(crate) fn log_reserve(&self, reserve: Duration) {
         if self.deadline.is_some() {
             let _ = self.record.reserve.set(reserve);
@@ -141,18 +141,18 @@ struct OpenCall {
     code: Option<Code>,
     reserve: Arc<DeadlineReserve>,
     transport: Transport,
-    /// For how long the transport has waited for other parts of the answer, from the end of the search on.
+    /// How long the transport has waited for parts of the answer since the end of the search.
     waited: Duration,
     _in_flight: watch::Receiver<()>,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Transport {
-    /// It waits for the first part, as it has since the call arrived.
+    /// It waits for the first part, since the call arrived.
     Waits,
     /// It has requested another part.
     WaitsSince(Instant),
-    /// It has all that it requested.
+    /// It has every requested part.
     Idles,
 }
 
@@ -185,14 +185,14 @@ impl OpenCall {
         answer.map(|inner| filtered(inner, self))
     }
 
-    /// The transport asks for the next part of the answer.
+    /// The transport requests the next part of the answer.
     fn asked(&mut self) {
         if let Transport::Idles = self.transport {
             self.transport = Transport::WaitsSince(Instant::now());
         }
     }
 
-    /// The transport has the part that it requested.
+    /// The transport has the requested part.
     fn answered(&mut self) {
         let transport = std::mem::replace(&mut self.transport, Transport::Idles);
         let record = &self.context.record;

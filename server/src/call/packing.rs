@@ -1,8 +1,8 @@
 //! Packs large messages with gzip for clients that accept it.
 //!
-//! Packing takes some 20 µs per kilobyte, which the threads that handle requests do not have: it is done away from them, by as many threads
-//! as there are places, and a message that finds none goes as it is. A message that arrives in the first round trip anyway would
-//! only come later, and is never packed.
+//! Packing takes some 20 µs per kilobyte, too long for the threads that handle requests. It runs on as many other threads as there
+//! are places; a message that finds no place is sent unpacked. Packing would only delay a message that fits
+//! into the first round trip.
 
 use std::{
     io::Write as _,
@@ -21,7 +21,7 @@ use tonic::{Status, body::Body};
 use super::STATUS;
 use crate::middleware::{FrameFilter, PolledFrame, filtered, next_frame};
 
-/// Smallest packed message, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
+/// Smallest packed message, in bytes: the initial window of a TCP connection (RFC 6928: ten segments).
 const MIN_PACKED: usize = 14 << 10;
 
 const ACCEPTED: &str = "grpc-accept-encoding";
@@ -57,7 +57,7 @@ pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
 }
 
 struct Packer {
-    /// What is being packed, which comes next.
+    /// The frame being packed, which is the next to be sent.
     packing: Option<JoinHandle<Bytes>>,
     places: Arc<Semaphore>,
 }
@@ -68,7 +68,7 @@ impl FrameFilter for Packer {
             if let Some(packing) = &mut self.packing {
                 let packed = std::task::ready!(Pin::new(packing).poll(cx));
                 self.packing = None;
-                // Only a panic, which the log has, or the end of the server keeps it from being packed.
+                // Fails only after a panic, which is logged, or when the server ends.
                 let packed = packed.map_err(|error| Status::internal(error.to_string()));
                 return Poll::Ready(Some(packed.map(Frame::data)));
             }
@@ -97,7 +97,7 @@ impl FrameFilter for Packer {
     }
 }
 
-/// The messages of a frame, each with its prefix and without. The transport's frames have whole messages; what is none is the last.
+/// The messages of a frame, each with its prefix and without. An incomplete message can only be the last.
 struct Messages(Bytes);
 
 impl Iterator for Messages {
@@ -136,7 +136,7 @@ fn packed(messages: Bytes) -> Bytes {
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut packer = GzEncoder::new(Vec::new(), Compression::fast());
-    // Writing to memory does not fail; what is not whole is not smaller, either.
+    // Writing to memory does not fail.
     let written = packer.write_all(bytes).and_then(|()| packer.finish());
     written.unwrap_or_else(|_| bytes.to_vec())
 }
@@ -178,7 +178,7 @@ mod tests {
         body.collect().await.expect("it does not fail").to_bytes()
     }
 
-    /// Bytes that no packing makes smaller.
+    /// Incompressible bytes.
     fn noise(length: usize) -> Vec<u8> {
         let mut state = 1_u64;
         let next = |_| {

@@ -1,7 +1,7 @@
 //! Uploads: their places, and how slowly they may arrive.
 //!
-//! A place is for what takes memory and processor time: a message of which more than a little has arrived, and an object that is built. What
-//! only drips takes none, and ends when it has dripped for a while.
+//! A place covers memory and processor time: of a message of which more than a little has arrived, and of building an object. A
+//! slow trickle takes no place, and ends after a while.
 
 use std::{
     pin::Pin,
@@ -20,7 +20,7 @@ use crate::{
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
-/// Bytes of an upload that arrive without a place: what most objects of a few hundred triangles take as a whole.
+/// Bytes of an upload that arrive without a place: the whole of most objects of a few hundred triangles.
 pub(super) const BYTES_WITHOUT_PLACE: usize = 64 << 10;
 
 /// Least rate of an upload after its first seconds, in bytes per second on average: a fortieth of a slow home's uplink.
@@ -44,7 +44,7 @@ impl UploadPermit {
         }
     }
 
-    /// That of a request, which [`super::Calls`] gives to each method that takes large messages.
+    /// Takes the permit out of a request. [`super::Calls`] puts one into each upload.
     pub(crate) fn of<T>(request: &mut tonic::Request<T>) -> Self {
         let permit = request.extensions_mut().remove();
         permit.expect("every upload comes with a permit")
@@ -59,7 +59,7 @@ impl UploadPermit {
         Ok(())
     }
 
-    /// Why the request could not be received to its end, if this is the reason.
+    /// Why the request was cut off, if by these bounds.
     pub(crate) fn failure(&self) -> Option<ServiceError> {
         self.failure.get().cloned()
     }
@@ -69,13 +69,13 @@ impl UploadPermit {
 struct UploadBounds {
     permit: UploadPermit,
     start: Instant,
-    /// How long nothing need arrive.
+    /// Longest pause.
     grace: Duration,
     received: usize,
     end: Pin<Box<Sleep>>,
 }
 
-/// The body of an upload that starts now, which may arrive slowly for the time of `grace`.
+/// The body of an upload that starts now and may be slow for `grace`.
 pub(super) fn bounded_upload(inner: Body, permit: UploadPermit, grace: Duration) -> Body {
     let start = Instant::now();
     let bounds = UploadBounds {
@@ -109,7 +109,7 @@ impl FrameFilter for UploadBounds {
         if matches!(polled, Poll::Ready(None)) {
             return polled;
         }
-        // When it has been too slow, if no more arrives until then.
+        // When it is too slow unless more arrives.
         let of_received = Duration::from_secs_f64(self.received as f64 / MIN_RATE as f64);
         let end = (self.start + self.grace + of_received).into();
         if self.end.deadline() != end {

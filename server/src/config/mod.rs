@@ -48,8 +48,8 @@ pub struct Config {
     pub io_threads: NonZeroUsize,
     /// Bounds on search times.
     pub budgets: BudgetLimits,
-    /// How much longer a search goes on after a first valid grasp that a person would not choose, if the request does not say;
-    /// at most 1 s. Longer finds more natural grasps, shorter answers sooner.
+    /// How much longer a search goes on after a first valid grasp that is not natural, if the request does not say; at most 1 s.
+    /// Longer finds more natural grasps, shorter answers sooner.
     pub refinement: Duration,
     /// Largest number of running and waiting searches; others are rejected.
     pub maximum_searches: NonZeroUsize,
@@ -143,14 +143,15 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Folder that keeps atlases: the given one, else `atlases` where objects are saved. None to keep them in memory only.
+    /// Folder that keeps atlases: the given one, else `atlases` where objects are saved. `None` to keep them in memory only.
     pub fn kept_atlases(&self) -> Option<PathBuf> {
         let beside_objects = || Some(self.place.folder()?.join("atlases"));
         self.atlas_directory.clone().or_else(beside_objects)
     }
 
-    /// Most threads that wait or compute beside those that search, build atlases and handle requests: so many searches, uploads,
-    /// preparations with a helper each, and messages that are packed there are at a time, a deletion or preparation ahead of calls, and what loads saved objects and waits for the disk.
+    /// Most threads besides those that search, build atlases and handle requests: one per search, upload and message being packed,
+    /// two per preparation, one for a deletion or preparation ahead of calls, and those that load saved objects or wait for the
+    /// disk.
     pub fn blocking_threads(&self) -> usize {
         let uploads = self.maximum_uploads.get();
         let of_store = if self.place == StorePlace::Memory {
@@ -209,7 +210,7 @@ pub enum ConfigError {
         /// The place and the cause.
         source: Box<toml::de::Error>,
     },
-    /// All invalid values, each with its key and what a valid one is.
+    /// All invalid values, each with its key and the values that are valid.
     #[error("{}", .0.join("\n"))]
     BadValues(Vec<String>),
 }

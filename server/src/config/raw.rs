@@ -152,7 +152,7 @@ pub struct RawConfig {
     pub log: Option<String>,
 }
 
-/// Accepts an empty path, which validation rejects together with everything else that is wrong.
+/// Accepts an empty path, which validation rejects together with all other errors.
 fn any_path() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().map(PathBuf::from)
 }

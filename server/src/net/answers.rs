@@ -16,7 +16,7 @@ use crate::{
     middleware::{Answer, FrameFilter, Middleware, PolledFrame, filtered, next_frame},
 };
 
-/// Largest chunk that is handed to the transport at once, in bytes: what a slow client takes of it shows.
+/// Largest chunk handed to the transport at once, in bytes: small enough to show the progress of a slow client.
 const CHUNK: usize = 32 << 10;
 
 /// Counts the answers of the services inside, and the requests that wait for them. Outermost, because other layers may copy
@@ -47,7 +47,7 @@ impl<B> Middleware<B> for UnreadCount {
 }
 
 struct AnswerCount {
-    /// What is left of the last frame of the body.
+    /// The rest of the last frame of the body.
     rest: Option<CountedBytes>,
     reader: Arc<Reader>,
     _open: Option<Arc<()>>,
@@ -77,7 +77,7 @@ impl FrameFilter for AnswerCount {
 /// Bytes that count until they are dropped.
 struct CountedBytes {
     bytes: Bytes,
-    /// Since when they wait, as the reader counts.
+    /// When they began to wait, by the reader's clock.
     since: u64,
     reader: Arc<Reader>,
 }

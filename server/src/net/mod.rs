@@ -1,4 +1,4 @@
-//! Accepts connections, bounds their number, their calls, what waits on them unread and what arrives on them, and closes them.
+//! Accepts connections, bounds their number, calls, unread answers and arriving bytes, and closes them.
 //!
 //! The accept loop replaces the transport's, which retries immediately when an accept fails: with all file descriptors in use,
 //! that costs most of a core.
@@ -96,8 +96,9 @@ fn concerns_one_connection(error: &io::Error) -> bool {
     )
 }
 
-/// A TCP connection that counts to the server's limit. Reading fails if the client does not send as many bytes as the HTTP/2 preface has
-/// in time, or too large headers of an HTTP/1 request; reading and writing fail once the connection is cut off.
+/// A TCP connection that counts to the server's limit. Reading fails if the client does not send as many bytes as the HTTP/2
+/// preface has in time, or if the headers of an HTTP/1 request are too large; reading and writing fail once the connection is cut
+/// off.
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: TcpStream,
@@ -121,7 +122,7 @@ struct Preface {
 struct Headers {
     /// The requests whose headers have been read.
     requests: u64,
-    /// Bytes read since then, of which the rest of that request is not counted.
+    /// Bytes read since then, without the rest of that request.
     read: usize,
 }
 
@@ -285,7 +286,7 @@ mod tests {
         let error = connection.read_to_end(&mut read).await.unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::InvalidData);
         assert!(read.len() <= MAX_HEADERS, "{} bytes", read.len());
-        // So it is if another request was answered meanwhile, but for its own headers.
+        // After another request, as many bytes of headers may arrive again.
         drop(reader.answering());
         let mut next = vec![0; MAX_HEADERS];
         connection.read_exact(&mut next).await.unwrap();

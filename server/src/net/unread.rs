@@ -1,10 +1,10 @@
 //! Bounds answers that wait for clients who do not read them, and requests that clients do not end.
 //!
-//! Flow control lets a client receive nothing while the server keeps what it answered. So every chunk of an answer counts
-//! from when the transport asks for it until its last byte was handed to the socket: per connection, whose further calls
-//! are rejected beyond a limit, and over all connections. Beyond that limit, those are closed that hold the most, by bytes times how long they have
-//! waited: not those that have just requested something large. A connection is also closed if it takes no chunk for a while. Requests
-//! count over all connections from when their bytes arrive until they are answered.
+//! Flow control lets a client receive nothing while the server keeps the answers. So every chunk of an answer counts from when the
+//! transport requests it until its last byte was handed to the socket: per connection, whose further calls are rejected beyond a
+//! limit, and over all connections. Beyond that limit, the connections with the most bytes times waiting time are closed: not those
+//! that have just requested something large. A connection is also closed if it takes no chunk for a while. Requests count over all
+//! connections from when their bytes arrive until they are answered.
 
 use std::{
     sync::{
@@ -48,12 +48,12 @@ pub(crate) struct UnreadAnswers {
     readers: Mutex<Vec<Weak<Reader>>>,
 }
 
-/// What waits on one connection.
+/// Bytes and calls that wait on one connection.
 #[derive(Debug)]
 pub(crate) struct Reader {
     all: Arc<UnreadAnswers>,
     waiting: Mutex<WaitingBytes>,
-    /// What has arrived of requests that are not answered.
+    /// Bytes of unanswered requests.
     arriving: Mutex<WaitingBytes>,
     /// When the client last took a chunk or the first one began to wait, in milliseconds since the start.
     progress: AtomicU64,
@@ -197,13 +197,13 @@ impl Reader {
         })
     }
 
-    /// Counts a request whose headers have been read; it is being answered until what this returns is dropped.
+    /// Counts a request whose headers have been read, as unanswered until the returned guard is dropped.
     pub(super) fn answering(&self) -> Arc<()> {
         self.requests.fetch_add(1, Ordering::Relaxed);
         Arc::clone(&self.answering)
     }
 
-    /// True if no request is being answered: on a connection that answers one at a time, what is read is headers.
+    /// True if no request is being answered: a connection that answers one at a time is reading headers.
     pub(super) fn awaits_headers(&self) -> bool {
         Arc::strong_count(&self.answering) == 1
     }
@@ -221,7 +221,7 @@ impl Reader {
         self.cut_off.cancel();
     }
 
-    /// Counts bytes that begin to wait. Gives the time, to be handed back with them.
+    /// Counts bytes that begin to wait. Returns the time, for [`Self::remove`].
     pub(super) fn add(&self, bytes: usize) -> u64 {
         let now = self.all.now();
         let mut waiting = locked(&self.waiting);
@@ -234,7 +234,7 @@ impl Reader {
         now
     }
 
-    /// Counts bytes that have waited since then, and that the client took or that went with the connection.
+    /// Uncounts bytes that have waited since then and were taken by the client or lost with the connection.
     pub(super) fn remove(&self, bytes: usize, since: u64) {
         let mut taken = WaitingBytes::default();
         taken.add(bytes, since);
@@ -243,7 +243,7 @@ impl Reader {
         self.progress.store(self.all.now(), Ordering::Relaxed);
     }
 
-    /// Counts bytes of a request that is not answered. Gives the time.
+    /// Counts bytes of an unanswered request. Returns the time.
     pub(super) fn begin(&self, bytes: usize) -> u64 {
         let now = self.all.now();
         locked(&self.arriving).add(bytes, now);
@@ -251,7 +251,7 @@ impl Reader {
         now
     }
 
-    /// Counts bytes of a request that is.
+    /// Uncounts bytes of an answered request.
     pub(super) fn end(&self, bytes: WaitingBytes) {
         locked(&self.arriving).remove(bytes);
         self.all.total.fetch_sub(bytes.bytes, Ordering::Relaxed);
@@ -287,7 +287,7 @@ mod tests {
         readers[2].add(1);
         let closed: Vec<bool> = readers.iter().map(|reader| is_closed(reader)).collect();
         assert_eq!(closed, [false, true, false]);
-        // What waits on connections that are being closed closes no others.
+        // Bytes on connections that are being closed close no others.
         readers[0].add(10);
         assert!(!is_closed(&readers[0]));
         assert_eq!(all.bytes(), 111);
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn closes_those_that_hold_for_long_and_not_who_has_just_asked_for_something_large() {
+    fn closes_connections_that_wait_for_long_and_not_one_with_a_large_new_answer() {
         let all = UnreadAnswers::new(100);
         let slow: Vec<_> = (0..10).map(|_| all.connect()).collect();
         for reader in &slow {
@@ -306,7 +306,7 @@ mod tests {
         let large = all.connect();
         large.add(60);
         assert!(!is_closed(&large));
-        // Of the others, only as many as it takes.
+        // Of the others, only as many as necessary.
         assert_eq!(slow.iter().filter(|reader| is_closed(reader)).count(), 4);
     }
 

@@ -1,8 +1,8 @@
 //! Chooses the receiving hand: searches with left and right hand in turn, within the same budget, for the better grasp.
 //!
-//! Slices alternate between the hands, short ones at first, until a hand has a grasp that a person would choose. After another
-//! grasp, both hands have the time for improving it together. A search for the best grasp gives half its budget to each hand.
-//! A reproducible one runs the same attempts of both, the right hand's first.
+//! Slices alternate between the hands, short ones at first, until a hand has a natural grasp. After another valid grasp, both hands
+//! share the time for improving it. A search for the best grasp gives half its budget to each hand. A reproducible one runs the
+//! same attempts of both, the right hand's first.
 
 use std::time::Duration;
 
@@ -21,8 +21,8 @@ const TURN_PER_WORKER: u64 = 4;
 /// The part of the time for improving a grasp in which the hand that found it goes on before the other's turn: a quarter.
 const OWN_PART: u32 = 4;
 
-/// How long the known grips of each hand are tried before the other's, if the call's own thread did not: as long as the core
-/// tries them before fresh attempts.
+/// How long the known grips of each hand are tried before the other's, if the call's own thread did not: as long as the core does
+/// before fresh attempts.
 const KNOWN_GRIPS_TIME: Duration = Duration::from_micros(300);
 
 /// Searches with two hands, each with its settings, whose query and run must be the same. Right comes first. If nothing is
@@ -79,7 +79,7 @@ struct EitherHand<'a> {
 }
 
 impl EitherHand<'_> {
-    /// Looks for a first valid grasp in turns, and for one that a person would rather choose a little longer.
+    /// Looks for a first valid grasp in turns, and a little longer for a natural one.
     fn first_valid(&mut self) -> SearchEnd {
         let site = self.site;
         let mut improves_until = match self.known_grip() {
@@ -137,7 +137,7 @@ impl EitherHand<'_> {
             slices.next.run.deadline = [self.deadline, Some(until)].into_iter().flatten().min();
             let outcome = slices.run(0);
             let is_valid = outcome.grasp.is_some();
-            // What is added last tells of all that was added.
+            // The sum of both hands.
             best = slices.add(outcome);
             if !is_valid {
                 slices.restore_known();
@@ -170,8 +170,8 @@ impl EitherHand<'_> {
         end
     }
 
-    /// Looks for the valid attempt with the lowest index, or one of those soon after it that a person would rather choose: the
-    /// same attempts of both hands decide, whatever the number of workers and the time.
+    /// Looks for the valid attempt with the lowest index, or a more natural one soon after it: the same attempts of both hands
+    /// decide, whatever the number of workers and the time.
     fn lowest_attempt(&mut self) -> SearchEnd {
         let site = self.site;
         for slices in &mut self.hands {

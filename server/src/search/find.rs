@@ -1,5 +1,4 @@
-//! Where a search runs, how long its call waits for it, and which of its grasps are shown meanwhile: every better one, or the best that
-//! differ.
+//! Where a search runs, how long its call waits for it, and the grasps shown meanwhile: every better one, or the best that differ.
 
 use std::{
     sync::{
@@ -39,9 +38,8 @@ struct RunningSearch {
     progress: Progress,
 }
 
-/// Runs a job: looks known grips up on this thread if that is quick, else searches on the executor. If the call has a
-/// deadline and the search does not end in time, because its threads wait for a core, the answer is what the search has
-/// found so far.
+/// Runs a job: looks known grips up on this thread if that is quick, else searches on the executor. If the call has a deadline and
+/// the search does not end in time, because its threads wait for a core, the answer is made from the grasps found so far.
 pub(crate) async fn find(
     job: FindJob,
     executor: &SearchExecutor,
@@ -80,7 +78,7 @@ async fn search(
         let running = Arc::clone(&running);
         executor.run(admission, move |pool, stop| {
             let job = prepare()?;
-            // Fails only if it is set, which happens here only.
+            // Fails only if it is set, and nothing else sets it.
             let _ = running.job.set(Arc::clone(&job));
             job.run(pool, stop, &running.progress)
         })
@@ -113,11 +111,11 @@ pub(crate) struct Found {
     grasp: FoundGrasp,
 }
 
-/// What the observers of both hands have found.
+/// Grasps found with both hands.
 #[derive(Debug)]
 struct Finds {
     sent: Sent,
-    /// Bits of the least quality that any grasp has to reach to be looked at.
+    /// Bits of the least quality at which a grasp is considered.
     least: AtomicU32,
     /// A grasp better than all that were taken.
     waiting: Mutex<Option<Found>>,
@@ -245,8 +243,8 @@ impl Stream {
         self.finds.news.notified().await;
     }
 
-    /// Takes the best grasp so far, if it is better than all that were taken; or the best that differ, best first, which are known once the
-    /// search has ended.
+    /// Takes the best grasp so far if it is better than all that were taken; or, once the search has ended, the best that differ,
+    /// best first.
     pub(crate) fn take(&self) -> Vec<Found> {
         let waiting = locked(&self.finds.waiting).take();
         let alternatives = std::mem::replace(&mut *locked(&self.finds.alternatives), Alternatives::new(0));

@@ -29,7 +29,7 @@ use crate::{
     validate::{FindQuery, GiverHand, MeshedHand},
 };
 
-/// Most edges of holes. A wrist has a hundred; whether a point is inside takes time in proportion to them.
+/// Most edges of holes: a wrist has a hundred. Tests for points inside take time in proportion to them.
 const MAX_RIM_EDGES: usize = 2000;
 
 #[derive(Clone, Debug)]
@@ -40,8 +40,7 @@ pub(crate) struct FindJob {
     /// The object in the form that searches use.
     pub derived: Arc<Derived>,
     pub stored: Arc<StoredObject>,
-    /// How many times as large the object is as that of `known`, if its size or mass is another one: known grips are starts
-    /// then.
+    /// Scale of the object relative to that of `known`, if size or mass differ: known grips are only starts then.
     pub resized: Option<f32>,
     pub seed: u64,
     /// When the call arrived; times count from here.
@@ -52,7 +51,7 @@ pub(crate) struct FindJob {
     /// Whether the call has a deadline, so that its answer must not wait for a search that ends late.
     pub has_deadline: bool,
     pub workers: usize,
-    /// How much longer the search goes on after a first valid grasp that a person would not choose.
+    /// How much longer the search goes on after a first valid grasp that is not natural.
     pub refinement: Duration,
     /// Known grips of the receiving hand, and of the alternative one.
     pub known: [KnownGrips; 2],
@@ -66,8 +65,8 @@ impl Clock for FindJob {
 }
 
 impl FindJob {
-    /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames and meshes
-    /// of hands are not. A current grasp is looked at whatever is asked of searches.
+    /// True if preparation, look-up and response are quick enough for the call's own thread, unlike key frames and meshes of hands.
+    /// A current grasp is checked in either case.
     pub(super) fn is_quick_if_known(&self) -> bool {
         let query = &self.query;
         self.known.iter().any(|known| !known.is_empty())
@@ -95,7 +94,7 @@ impl FindJob {
         self.arrived + self.patience
     }
 
-    /// When the call is answered without the end of its work, if ever.
+    /// When the call is answered before its work ends, if ever.
     pub(crate) fn overdue(&self) -> Option<Instant> {
         self.has_deadline.then(|| self.due() + OVERDUE_AFTER)
     }
@@ -226,7 +225,7 @@ fn holdout(query: &FindQuery, object: &Arc<GraspObject>, stance: Stance) -> Resu
     })
 }
 
-/// Prepares a hand of which only the mesh is known, in the object's frame.
+/// Prepares a hand given as a mesh only, in the object's frame.
 fn hand_mesh(hand: &MeshedHand, object_from_client: Pose) -> Result<Arc<HandMesh>, ServiceError> {
     let invalid = |wrong: String| ServiceError::invalid(hand.field.as_str(), wrong);
     let positions = hand

@@ -1,5 +1,5 @@
-//! A search that is ready to run, from looking known grips up to the response: the grasp, where that came from, what was passed over,
-//! what is to be learned, what became of a current grasp, and what keeps a search from finding one.
+//! A search that is ready to run, from the look-up of known grips to the response: the grasp and its source, grips passed over, the
+//! grip to learn, the fate of a current grasp, and limits that keep a search from finding one.
 
 use std::{
     ops::Deref,
@@ -46,7 +46,7 @@ use crate::{
 /// How long a look-up of known grips may take on the call's own thread, for both hands together. A longer one delays other calls.
 const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 
-/// A number of tried known grips that leaves none to try.
+/// Marks all known grips as tried.
 const ALL_TRIED: usize = usize::MAX;
 
 /// The result of a search, or of other work on a holdout.
@@ -169,7 +169,7 @@ impl PreparedJob {
         }
     }
 
-    /// What was repaired in the request.
+    /// Repairs made to the request.
     pub(super) fn warnings(&self) -> impl Iterator<Item = &String> {
         let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
         hands.flat_map(GiverHand::warnings)
@@ -184,7 +184,7 @@ impl PreparedJob {
         }
     }
 
-    /// Makes the response of an outcome, with what became of a current grasp unless the search tells.
+    /// Makes the response of an outcome, with the verdict on a current grasp unless the search has one.
     pub(super) fn answer(
         &self,
         ended: Ended,
@@ -200,7 +200,7 @@ impl PreparedJob {
             outcome.end,
             SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted
         ) {
-            // A small part of what the budget leaves for the way back.
+            // Takes a small part of the time reserved for the response.
             outcome.report.limits = self.limits();
         }
         let verdict = verdict.or_else(|| self.verdict_after(place, &outcome));
@@ -233,7 +233,7 @@ impl PreparedJob {
                 // Rounding to and from the client's convention would move the hand a little with every request.
                 grasp.hand.get_or_insert_default().object_from_wrist = Some(given.object_from_wrist);
                 if is_kept {
-                    // Its grace alone may keep it.
+                    // It may be valid only by its grace.
                     settle_margins(grasp, report.failed_check.as_slice());
                 }
             }
@@ -267,8 +267,8 @@ impl PreparedJob {
         plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
     }
 
-    /// What is decided about the current grasp without a search; `None` if it failed a check and nothing known replaces it, or if
-    /// `stop` says so first.
+    /// The verdict on the current grasp without a search; `None` if it failed a check and no known grip replaces it, or if `stop`
+    /// says so first.
     fn settle(&self, place: HandPlace, stop: Stop<'_>) -> Option<(Ended, CurrentGraspVerdict)> {
         let settings = &self.hands[place].settings;
         match settle(&Scene::new(self.task(place), settings), settings, stop)? {
@@ -289,7 +289,7 @@ impl PreparedJob {
         self.hands.iter().position(has_it)
     }
 
-    /// What became of a current grasp that failed a check, after a search with one hand.
+    /// The verdict on a current grasp that failed a check, after a search with one hand.
     fn verdict_after(&self, hand: HandPlace, outcome: &SearchOutcome) -> Option<CurrentGraspVerdict> {
         let place = self.current_place()?;
         let settings = &self.hands[place].settings;
@@ -302,7 +302,7 @@ impl PreparedJob {
         Some(verdict)
     }
 
-    /// Where an answer with one hand came from, and what is known for each hand, that one first.
+    /// The source of an answer with one hand, and the atlases used for each hand, that one's first.
     pub(super) fn origin(&self, answered: HandPlace, source: Option<GraspSource>) -> v1::GraspOrigin {
         let HandSearch {
             settings, preferred, ..
@@ -325,7 +325,7 @@ impl PreparedJob {
         atlas_used(&self.query.object_id, hand.hand.rig.handedness, settings)
     }
 
-    /// Names of the preferred grips that were tried before an answer with one hand, and why they are none.
+    /// Names of the preferred grips that were tried before an answer with one hand, and the checks that they failed.
     fn passed_over(&self, answered: HandPlace, source: Option<GraspSource>) -> Vec<(&str, FailedCheck)> {
         if source == Some(GraspSource::Current) {
             return Vec::new();
@@ -342,7 +342,7 @@ impl PreparedJob {
         all
     }
 
-    /// The grip to learn: one that an attempt found under the object's own friction and size, which known grips are for.
+    /// The grip to learn: found by an attempt under the object's own friction and size.
     fn new_grip(&self, outcome: &SearchOutcome, place: HandPlace) -> Option<(Arc<Hand>, Entry)> {
         let HandSearch {
             hand,
@@ -359,8 +359,8 @@ impl PreparedJob {
         Some((Arc::clone(&hand.hand), entry))
     }
 
-    /// What keeps a hand from holding the object. Of two hands, each has to be limited; both limit mostly the same. Without proof,
-    /// known grips say what is in the way; a hand without any is taken to be like the other.
+    /// Limits that keep each hand from holding the object. If none are proven, known grips show the obstacles; a hand without known
+    /// grips counts like the other.
     pub(super) fn limits(&self) -> Vec<Limit> {
         let hands = || self.hands.iter().enumerate();
         let proven = of_each(hands().map(|(place, search)| limits(self.task(place), &search.settings.query)));

@@ -1,4 +1,4 @@
-//! Runs searches in slices, so that concurrent searches share the workers, and adds up what they find.
+//! Runs searches in slices, so that concurrent searches share the workers, and sums their results.
 //!
 //! A search without a grasp would otherwise hold the workers until its budget ends. Each slice queues behind the slices
 //! of other searches. Slices cover consecutive attempts: slicing does not change which attempt wins a reproducible
@@ -52,27 +52,27 @@ struct Sum {
     grasp: Option<Grasp>,
     value: f32,
     hand: HandPlace,
-    /// Until when a best grasp that a person would not choose may be replaced.
+    /// Until when a best grasp that is not natural may be replaced.
     replaceable_until: Option<Replaceable>,
     /// The hand of the nearest miss.
     missing_hand: HandPlace,
     /// The first attempt that has not run.
     next: u64,
-    /// Must the answer not depend on the time that was left?
+    /// True if the answer must not depend on the time left.
     is_reproducible: bool,
-    /// Whether the best is wanted.
+    /// Whether the search is for the best grasp.
     compares_all: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found {
     Nothing,
-    /// One that one of the next attempts may replace.
+    /// A grasp that one of the next attempts may replace.
     Replaceable {
         attempts: u64,
         by: Option<Duration>,
     },
-    /// One that no later attempt replaces, unless the best is wanted.
+    /// A grasp that no later attempt replaces, unless the search is for the best.
     Settled,
 }
 
@@ -86,9 +86,9 @@ impl Sum {
         }
     }
 
-    /// True if a slice's grasp is preferred to the best so far: a preferred grip to all others; one that a person would choose
-    /// to others; unless the best is wanted, a grip of one hand's atlas to a learned one of the other; then the one with
-    /// the lower attempt, if the search is reproducible and both have one; then the better one.
+    /// True if a slice's grasp is preferred to the best so far: a preferred grip to all others; a natural grasp to others; unless
+    /// the search is for the best, a grip of one hand's atlas to a learned one of the other; then the lower attempt, if the search
+    /// is reproducible and both have one; then the better one.
     fn prefers(&self, slice: &SearchOutcome) -> bool {
         if self.grasp.is_none() {
             return true;
@@ -129,7 +129,7 @@ impl Progress {
         if is_better {
             let is_first = sum.grasp.is_none();
             (sum.grasp, sum.value, sum.hand) = (slice.grasp, slice.value, hand);
-            // The first one decides for how long, unless a later one needs less.
+            // The first one sets the time, unless a later one needs less.
             if replaces || is_first {
                 sum.replaceable_until = slice.replaceable_until;
             }
@@ -158,7 +158,7 @@ impl Progress {
         let is_found = sum.grasp.is_some();
         let mut report = sum.report;
         if sum.is_reproducible {
-            // How many others were found by then depends on the slices.
+            // The number of others found by then depends on the slices.
             report.candidates = u64::from(is_found);
         }
         if is_found {
@@ -184,7 +184,7 @@ impl Progress {
     }
 }
 
-/// Where slices run, and what they watch and add to.
+/// The pool, clock, stop and progress of a search's slices.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {
     pub pool: &'a ThreadPool,
@@ -290,7 +290,7 @@ pub(super) fn search_in_slices(
             slices.left = slices.left.min(attempts);
             next.run.deadline = [next.run.deadline, by].into_iter().flatten().min();
         }
-        // The first valid grasp ends the search unless the best is wanted.
+        // The first valid grasp ends the search unless the search is for the best.
         let is_enough = found == Found::Settled && next.query.choice == Choice::FirstValid;
         let is_stopped = end == SearchEnd::Stopped;
         let is_late = end == SearchEnd::DeadlinePassed || site.has_passed(next.run.deadline);

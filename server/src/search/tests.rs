@@ -1,4 +1,4 @@
-//! Any request that passes validation is answered, judged or rated without a panic, and what is wrong with others is named.
+//! Any valid request is answered, judged or rated without a panic, and the errors of others are named.
 
 mod requests;
 
@@ -147,7 +147,7 @@ fn answers_every_request_that_passes_validation() {
     assert!(searched.get().iter().all(|&count| count >= 20), "{searched:?}");
 }
 
-/// Checks that each violation is of one of these fields of the request, and says what is wrong.
+/// Checks that each violation is of one of these fields of the request, and has a description.
 fn assert_named(error: &ServiceError, fields: &str) -> Result<(), TestCaseError> {
     let ServiceError::Invalid(violations) = error else {
         return Err(TestCaseError::fail(error.to_string()));
@@ -179,7 +179,7 @@ fn one_hand_request() -> impl Strategy<Value = v1::FindGraspRequest> {
 }
 
 #[test]
-fn judges_and_rates_whatever_passes_validation() {
+fn judges_and_rates_every_request_that_passes_validation() {
     let examined = Cell::new([0; 3]);
     let count = |kind: usize| {
         let mut counts = examined.get();

@@ -30,8 +30,8 @@ use crate::{
     validate::{GivenGrasp, GiverHand},
 };
 
-/// Judges a grasp by the checks of a search with its hand; searches for a valid one near it if that is wanted and the grasp is not valid.
-/// `warnings` tell what was repaired in the grasp.
+/// Judges a grasp by the checks of a search with its hand. If it is not valid, searches for a valid one near it on request.
+/// `warnings` are the repairs of the grasp.
 pub(crate) fn judge(
     find: FindJob,
     grasp: &GivenGrasp,
@@ -69,7 +69,7 @@ pub(crate) fn judge(
     let verdicts: Vec<v1::Verdict> = verdicts.map(|verdict| wire_verdict(verdict, frame)).collect();
     let mut seen = wire_grasp(&judgement.grasp, hand, frame);
     settle_margins(&mut seen, &verdicts);
-    // How far the rig's joints are from tracked ones at most.
+    // Largest distance of the rig's joints from tracked ones.
     let joint_error = match grasp {
         GivenGrasp::AtObject(_) => None,
         GivenGrasp::Tracked(joints) => {
@@ -99,7 +99,7 @@ pub(crate) fn judge(
     })
 }
 
-/// Names an obstacle by its place in the request, which may be made of several.
+/// Names an obstacle by its place in the request, where one entry may be several obstacles.
 fn name_obstacle(verdict: &mut Verdict, places: &[usize]) {
     if let Some(Against::Barrier(solid @ Barrier::Obstacle(number))) = verdict.against {
         let sent = Barrier::Obstacle(places[number]);
@@ -108,8 +108,8 @@ fn name_obstacle(verdict: &mut Verdict, places: &[usize]) {
     }
 }
 
-/// Rates a holdout, and the same with each other hand in place of the giver's. Each giver has the same part of the budget; what is not
-/// checked by then does not count.
+/// Rates a holdout, and the same with each other hand in place of the giver's. Each giver has the same part of the budget; grips
+/// that are unchecked by then do not count.
 pub(crate) fn rate(
     find: &FindJob,
     other_presenting_hands: Vec<GiverHand>,
@@ -207,7 +207,7 @@ fn rating(
     }
 }
 
-/// Why there is no grasp, as far as is known.
+/// The known reason why there is no grasp.
 fn reason(evaluation: &Evaluation, prepared: &PreparedJob) -> v1::Check {
     let count = |what| evaluation.hindered_by(what);
     let obstructed =

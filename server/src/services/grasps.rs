@@ -46,7 +46,7 @@ impl Handler {
         Ok(answered.response)
     }
 
-    /// Does work on a holdout that nothing answers before its end.
+    /// Works on a holdout, with an answer only at the end.
     async fn examine<T: Send + 'static>(
         &self,
         holdout: FindQuery,
@@ -71,7 +71,7 @@ impl Handler {
         let stored = self.object(&query.object_id, call).await?.object;
         let held = stored.hold();
         let admission = self.executor.places.take()?;
-        // From when the budget counts: preparing the object does not.
+        // The budget starts after the object's preparation.
         let (mut derived, mut since) = match self.objects.kept(&stored, Need::Call) {
             Some(kept) => (kept, call.arrived),
             None => (self.derived(&stored, call).await?, Instant::now()),
@@ -125,7 +125,7 @@ impl Handler {
         Ok((admission, job))
     }
 
-    /// Sends what a search finds: better grasps as they are found, no two within the interval, or in the end the best that differ;
+    /// Sends the grasps of a search: better ones as they are found, no two within the interval, or in the end the best that differ;
     /// then how it ended.
     async fn send_found(
         &self,
@@ -171,7 +171,7 @@ impl Handler {
             ..answered.response
         };
         if has_sent {
-            // An answer that could not wait for the end of the search may know less than was sent.
+            // An answer before the end of the search may lack a grasp already sent.
             last.set_outcome(v1::Outcome::Found);
         }
         sender.send(last).await

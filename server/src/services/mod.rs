@@ -38,7 +38,7 @@ use crate::{
     validate::{Field, Violations},
 };
 
-/// New objects of which the latest are prepared for their first calls.
+/// Number of newest objects that are prepared for their first calls.
 const MAX_PREPARED_AHEAD: u64 = 16;
 
 /// Bytes per permit of the pool that uploads in pieces share.
@@ -55,8 +55,7 @@ pub(crate) struct Shared {
     pub resizer: Resizer,
     /// The part of deadlines kept for answers.
     pub reserve: Arc<DeadlineReserve>,
-    /// One permit: deletions wait for their turn here, where they take no thread. Threads that wait for the disk could otherwise
-    /// be all that there are, and the disk needs some, too.
+    /// One permit: deletions queue here without holding a thread, or they could take all threads that wait for the disk.
     pub deletions: Arc<Semaphore>,
     /// A permit per [`BYTES_PER_PERMIT`] bytes of all uploads in pieces together.
     pub upload_bytes: Arc<Semaphore>,
@@ -107,7 +106,7 @@ impl Shared {
         Ok(revision)
     }
 
-    /// What is derived from an object, built before the call's deadline unless another call does so meanwhile, and prepared for the
+    /// The data derived from an object, built before the call's deadline unless another call is building it, and prepared for the
     /// hands of the default rig.
     async fn derived(
         &self,
@@ -150,7 +149,7 @@ impl Handler {
         .await?
     }
 
-    /// Derives what calls need from a new object, once no other has to be and unless many newer ones wait.
+    /// Prepares a new object for calls when its turn comes, unless many newer ones wait.
     fn derive_ahead(&self, object: &Arc<StoredObject>) {
         let number = self.created.fetch_add(1, Ordering::Relaxed);
         let (handler, object) = (self.clone(), Arc::downgrade(object));
@@ -178,7 +177,7 @@ impl Handler {
     }
 }
 
-/// The id in the field `name`, read by `read`, which is all that may be wrong with a request.
+/// The id in the field `name`, read by `read`; the request has no other field to check.
 fn checked_id(
     name: &str,
     read: impl FnOnce(Field<'_>, &str) -> Option<String>,

@@ -59,7 +59,7 @@ impl Handler {
         self.whole_message(&object).await
     }
 
-    /// Receives the parts of an upload: a request with its mesh, and the room that this takes.
+    /// Receives the parts of an upload: a request with its mesh, and the permit for its memory.
     async fn receive(
         &self,
         parts: Streaming<v1::UploadObjectRequest>,
@@ -67,11 +67,11 @@ impl Handler {
     ) -> Result<(v1::CreateObjectRequest, OwnedSemaphorePermit), ServiceError> {
         let mut parts = pin!(parts);
         let idle = self.config.streams.upload_idle;
-        // The next part, with the total that it names; `None` at the end.
+        // The next part, with the total that it states; `None` at the end.
         let mut next = async || match tokio::time::timeout(idle, parts.next()).await {
             Err(_) => Err(ServiceError::UploadStalled { limit: idle }),
             Ok(None) => Ok(None),
-            // What is no message of the contract, or too long for one.
+            // Not a message of the contract, or too long.
             Ok(Some(Err(status))) => Err(ServiceError::Malformed(status.message().to_owned())),
             Ok(Some(Ok(request))) => match request.part {
                 Some(part) => Ok(Some((part, request.total_bytes))),
@@ -140,7 +140,7 @@ impl Handler {
         Ok((request, room))
     }
 
-    /// Sends an object's mesh as a file. Its pieces are made from the object in memory, one when the transport takes it.
+    /// Sends an object's mesh as a file, in pieces made when the transport takes them.
     pub(super) async fn mesh(
         &self,
         name: &str,

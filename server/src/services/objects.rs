@@ -37,7 +37,7 @@ const ELEMENT_OVERHEAD: usize = 6;
 /// Records of objects at rest that are read at a time for a page.
 const READ_AT_A_TIME: usize = 16;
 
-/// How often a change without an etag starts again because others change the same object meanwhile.
+/// Attempts at a change without an etag while others change the same object.
 const CHANGE_ATTEMPTS: usize = 8;
 
 impl Handler {
@@ -85,7 +85,7 @@ impl Handler {
         }
         match self.whole_message(state).await {
             Err(ServiceError::ObjectNotFound { .. }) => Ok(None),
-            // What is known of it is listed.
+            // Listed as far as it is known.
             Err(ServiceError::ObjectDamaged { .. }) => Ok(Some(state.to_wire())),
             message => message.map(Some),
         }
@@ -101,13 +101,13 @@ impl Handler {
         objects.found(&query.id).await?;
         let base = objects.changeable(&query.id, query.etag.as_deref())?;
         query.check_immutable(&base.to_wire())?;
-        // Labels change without the object.
+        // Changing labels does not need the object.
         let object = if query.change.is_empty() {
             None
         } else {
             Some(self.object(&query.id, call).await?.object)
         };
-        // Another size is best read from the file, if that is saved.
+        // The mesh in another size is best read from its file, if that is saved.
         let rebuilt = match (&object, query.change.unit_metres) {
             (Some(object), Some(unit)) if object.file.unit_metres != unit => {
                 objects.rebuilt(&query.id, &query.change).await?
@@ -159,17 +159,17 @@ impl Handler {
     }
 }
 
-/// The first objects of a list, whose messages take no more than some bytes together; at least one.
+/// The first objects of a list whose messages fit into the room; at least one.
 #[derive(Debug)]
 struct Page {
     objects: Vec<v1::GraspObject>,
-    /// Number of objects of the list so far, those that are gone included.
+    /// Number of objects of the list so far, deleted ones included.
     listed: usize,
     room: usize,
 }
 
 impl Page {
-    /// Adds the next object, or none if it is gone. False if there is no room for it.
+    /// Adds the next object, unless it was deleted (`None`). False if there is no room for it.
     fn add(&mut self, object: Option<v1::GraspObject>) -> bool {
         if let Some(object) = object {
             let bytes = object.encoded_len() + ELEMENT_OVERHEAD;
@@ -184,7 +184,7 @@ impl Page {
     }
 }
 
-/// The object's id and the hand in the name of an atlas, which is all that may be wrong with a request.
+/// The object's id and the hand in the name of an atlas; the request has no other field to check.
 fn atlas_named(name: &str) -> Result<(String, Handedness), ServiceError> {
     let parts = name.rsplit_once("/atlases/").and_then(|(object, side)| {
         let handedness = match side {
@@ -276,7 +276,7 @@ impl ObjectService for Handler {
         let object = loop {
             attempts += 1;
             match self.try_update(&query, permit.clone(), &call).await {
-                // Without an etag, the change applies to whatever others made of the object meanwhile.
+                // Without an etag, the change applies to the latest version of the object.
                 Err(ServiceError::ObjectChanged { .. })
                     if query.etag.is_none() && attempts < CHANGE_ATTEMPTS => {}
                 result => break result?,
@@ -347,7 +347,7 @@ mod tests {
             name: "n".repeat(length),
             ..Default::default()
         };
-        // An object of length 0 is gone: it takes no room, but a place.
+        // A deleted object (length 0) takes no room, but a place.
         for (lengths, listed) in [
             (&[300, 300, 300][..], 3),
             (&[600, 300, 300], 2),

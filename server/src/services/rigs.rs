@@ -44,7 +44,7 @@ use crate::{
     wire::{wire_digit, wire_handedness},
 };
 
-/// The built-in rig that gives others their axes, limits and, where nothing else is known, widths.
+/// The built-in rig from which others get their axes, limits and, by default, widths.
 const REFERENCE: &str = "adult";
 
 /// The fields of a request that a rig is made from.
@@ -61,7 +61,7 @@ const BOXES: [Vec3; 3] = [
     Vec3::new(0.06, 0.028, 0.028),
 ];
 
-/// Attempts at each box. Ordinary hands need some tens; more would delay the refusal of hands that take nothing.
+/// Attempts at each box. Ordinary hands need some tens; more would delay the refusal of hands that cannot take any.
 const ATTEMPTS: u64 = 1500;
 
 #[tonic::async_trait]
@@ -309,7 +309,7 @@ fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
     violations.finish(())
 }
 
-/// Derives what searches need, which otherwise the first search would do, outside its budget. Takes some tenths of a second.
+/// Prepares the hands for searches, which the first search would otherwise do outside its budget. Takes some tenths of a second.
 fn prepare_rig(rig: &StoredRig) {
     for hand in &rig.hands {
         hand.hand.rig.oppositions();
@@ -392,7 +392,7 @@ fn unloadable(saved: &Records, id: &str, error: &ServiceError) -> StoreError {
     ))
 }
 
-/// The hand of a rig. Its skin, which only a giver under THESIS validity shows, is the reference's, stretched.
+/// The hand of a rig. Its skin, used only for a giver under THESIS validity, is the reference's, stretched.
 fn rig_hand(made: ImportedHand) -> RigHand {
     let reference = hands::hand(REFERENCE, made.rig.handedness).expect("the rig is built in");
     RigHand {
@@ -414,8 +414,8 @@ impl Clock for NoClock {
     }
 }
 
-/// Lets a hand that is `size` times as large as an adult's take the boxes, each time by the same attempts on the calling thread: the
-/// number of those that it takes, and why most attempts failed.
+/// Lets a hand that is `size` times as large as an adult's take the boxes, each by the same attempts on the calling thread. Returns
+/// how many it takes, and why most attempts failed.
 fn taken_boxes(rig: &PreparedRig, size: f32) -> (usize, Rejection) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let pool = pool.expect("a thread can be started");

@@ -1,5 +1,5 @@
-//! Answers of many messages: a task sends them into a short queue, from which the transport takes them as fast as the client
-//! reads. Messages that are made from what is there anyway need no queue: each is made when the transport takes it.
+//! Answers of many messages: a task sends them into a short queue, from which the transport takes them as fast as the client reads.
+//! Messages made from existing data need no queue: each is made when the transport takes it.
 
 use std::{
     iter,
@@ -38,8 +38,8 @@ impl<T> MessageSender<T> {
     }
 }
 
-/// Sends what `produce` produces, in a task that ends when the client is gone. An error becomes the status, and so does the
-/// end of the server.
+/// Sends the messages of `produce` in a task that ends when the client is gone. An error becomes the status, and so does the end of
+/// the server.
 pub(crate) fn messages<T, F>(
     shutdown: CancellationToken,
     produce: impl FnOnce(MessageSender<T>) -> F,
@@ -57,15 +57,14 @@ where
             produced = producing => produced,
         };
         if let Err(error) = produced {
-            // If the client is gone by now, nobody misses the status.
+            // If the client is gone, nobody misses the status.
             let _ = sender.send(Err(error.into())).await;
         }
     });
     Box::pin(ReceiverStream::new(receiver))
 }
 
-/// An answer of these messages, each made when the transport takes it. What they are made from is dropped if the client takes none for
-/// too long.
+/// An answer of these messages, each made when the transport takes it. Their source is dropped if the client stalls for too long.
 pub(crate) fn lazy_messages<T: 'static>(messages: impl Iterator<Item = T> + Send + 'static) -> Messages<T> {
     lazy_within(MAX_STALL, messages)
 }
@@ -74,7 +73,7 @@ fn lazy_within<T: 'static>(
     longest_stall: Duration,
     messages: impl Iterator<Item = T> + Send + 'static,
 ) -> Messages<T> {
-    // What is left, `None` once the client has stalled for too long; and the number of messages that were taken.
+    // The remaining messages, `None` once the client has stalled for too long; and the number of those taken.
     let left = Arc::new(Mutex::new((Some(messages), 0_u64)));
     let watched = Arc::downgrade(&left);
     tokio::spawn(async move {

@@ -25,7 +25,7 @@ use crate::{
     validate::{Frame, Latest, TrackPolicy, TrackQuery, sentences, track_query},
 };
 
-/// A track from its start to its end. A search that runs ends when it is dropped.
+/// A track from its start to its end. Dropping it stops a running search.
 struct Track {
     handler: Handler,
     inbox: Arc<Inbox>,
@@ -36,7 +36,7 @@ struct Track {
     recent: RecentHands,
     motion: Option<Motion>,
     answered: u64,
-    /// Time of the latest frame that had one.
+    /// Time of the latest frame with a time.
     captured: Option<Duration>,
     opened: Instant,
     /// When its stream has to end.
@@ -91,7 +91,7 @@ impl Handler {
     ) -> Result<v1::TrackAnswer, ServiceError> {
         let name = frame.track.clone();
         let (reply, answer) = oneshot::channel();
-        // While it waits, it holds nothing of the track.
+        // Does not hold the track while it waits.
         put(
             &*self.tracks.inbox(&name)?,
             frame,
@@ -125,7 +125,7 @@ impl Handler {
         call.log_object(&object_id);
         let permit = self.tracks.places.take()?;
         let object = self.object(&object_id, call).await?.object;
-        // What searches need is derived before the first frame.
+        // Prepares the object for searches before the first frame.
         self.derived(&object, call).await?;
         Ok(Track {
             handler: self.clone(),
@@ -186,7 +186,7 @@ fn put(
     })
 }
 
-/// What is no message of the contract, or too long for one.
+/// The error of an input that is not a message of the contract, or too long.
 fn broken(status: &Status) -> ServiceError {
     match status.code() {
         Code::OutOfRange => ServiceError::MessageTooLarge {
@@ -225,7 +225,7 @@ impl Track {
         while let Ok(Some(PendingFrame { latest, call, reply })) = self.latest().await {
             let answer = self.answer(latest, &call).await;
             if reply.is_some_and(|reply| reply.send(answer).is_err()) {
-                // Nobody has read it.
+                // Nobody received it.
                 self.holding.is_sent = false;
             }
         }
@@ -296,7 +296,7 @@ impl Track {
         };
         let is_aborted = self.holding.is_aborted(frame.is_committed);
         let found = match self.find(frame, at, call).await {
-            // A hand that is well-formed but no surface.
+            // A well-formed hand whose mesh is no surface.
             Err(ServiceError::Invalid(violations)) => {
                 answer.warnings.extend(sentences(violations));
                 answer.current = Some(none(v1::Check::Frame));
@@ -344,7 +344,7 @@ impl Track {
     }
 }
 
-/// The report on an answer before which there was no grasp.
+/// The report on an answer without an earlier grasp.
 fn first_report(found: &v1::FindGraspResponse) -> v1::CurrentGraspReport {
     if !found.grasps.is_empty() {
         return v1::CurrentGraspReport {

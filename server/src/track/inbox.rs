@@ -1,4 +1,4 @@
-//! Where the frames of tracks go: the inbox of each, and the names of those whose frames come in calls of their own.
+//! Inboxes of tracks, and the names of those whose frames come in calls of their own.
 
 use std::{
     collections::HashMap,
@@ -21,15 +21,15 @@ use crate::{
     validate::{Latest, TrackIntake, quoted},
 };
 
-/// Most answers that are sent before the client has read them. More let clients far away have an answer to each frame.
+/// Most unread answers. More let distant clients have an answer to each frame.
 const MAX_UNREAD: u64 = 6;
 
-/// How long a frame waits at most for answers to be read, if no other one follows: the last frame of a burst is answered, too.
+/// Longest wait of a frame for answers to be read, if no other one follows: the last frame of a burst is answered, too.
 const MAX_UNREAD_TIME: Duration = Duration::from_millis(500);
 
 const COLLECTION: &str = "tracks/";
 
-/// When to retry if there are as many tracks as there may be: they end when givers let go.
+/// When to retry if there are too many tracks: they end when givers let go.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 /// Takes frames in, and keeps the latest until it is taken.
@@ -53,7 +53,7 @@ struct State {
 #[derive(Debug)]
 pub(crate) struct PendingFrame {
     pub latest: Latest,
-    /// The call that it came with, or the part of a stream.
+    /// The call of the frame, or the part of a stream.
     pub call: CallContext,
     /// Where its answer goes; `None` for the stream.
     pub reply: Option<Reply>,
@@ -75,8 +75,8 @@ impl Inbox {
         }
     }
 
-    /// Takes a frame in, which `check` makes the latest unless a later one came before. A pushed one is answered at once if it is
-    /// overtaken.
+    /// Takes a frame in, which `check` makes the latest unless a later one came before. A superseded pushed frame is answered at
+    /// once.
     pub(crate) fn put(
         &self,
         frame: v1::TrackFrame,
@@ -100,7 +100,7 @@ impl Inbox {
         };
         drop(state);
         if let Some((reply, sequence)) = overtaken {
-            // Whoever waits no more needs no answer.
+            // A caller that has left needs no answer.
             let _ = reply.send(Ok(v1::TrackAnswer {
                 sequence,
                 ..Default::default()
@@ -115,7 +115,8 @@ impl Inbox {
         self.news.notify_one();
     }
 
-    /// Waits for a frame that nobody has taken, and takes the latest; `None` at the end. After so many answers, it may wait until more of them are read.
+    /// Waits for a new frame, and takes the latest; `None` at the end. After so many answers, it may wait until more of them are
+    /// read.
     pub(crate) async fn latest(
         &self,
         answered: u64,
@@ -163,7 +164,7 @@ pub(crate) struct OpenTracks {
 #[derive(Debug)]
 struct OpenTrack {
     inbox: Arc<Inbox>,
-    /// Its only task answers its frames.
+    /// The only task, which answers its frames.
     task: JoinSet<()>,
 }
 
@@ -218,7 +219,7 @@ impl OpenTracks {
     pub(crate) async fn delete(&self, name: &str) -> Result<(), ServiceError> {
         let id = id_of("name", name)?;
         let mut track = locked(&self.by_name).remove(&id).ok_or_else(|| not_found(name))?;
-        // Until it holds nothing.
+        // Waits until its task has released everything.
         track.task.shutdown().await;
         Ok(())
     }

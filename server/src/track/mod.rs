@@ -1,10 +1,9 @@
-//! A giver who moves: frames come, the latest is answered, and the grasp of the answer before is kept as long as it is valid.
+//! A moving giver: frames come, the latest is answered, and the grasp of the previous answer is kept as long as it is valid.
 //!
-//! Nothing queues here. Frames go to an [`Inbox`], where a later one takes the place of one that nobody has taken yet. On a stream, an
-//! answer is computed when the transport asks for it and, if the frames say how many answers were read, when few are unread: the
-//! transport holds many more. A created track, one of [`OpenTracks`], has a task that answers the calls which push its frames. Each frame
-//! is a request to find a grasp with a current one; [`HeldGrasp`] knows which, and [`RecentHands`] where the hands were that it should keep
-//! clear of.
+//! Nothing queues here. Frames go to an [`Inbox`], where a later one replaces an untaken one. On a stream, an answer is computed
+//! when the transport requests it and, if the frames say how many answers were read, when few are unread: the transport holds many
+//! more. A created track, one of [`OpenTracks`], has a task that answers the calls which push its frames. Each frame is a request
+//! to find a grasp with a current one, which is in [`HeldGrasp`]; [`RecentHands`] are the places of hands to keep clear of.
 
 mod inbox;
 mod motion;
@@ -26,28 +25,28 @@ use crate::{
     validate::{FindQuery, Frame, GiverHand, TrackPolicy},
 };
 
-/// How much too close to a hand a grasp may be while its grace lasts, in metres: a headset's noise, and a sway where every other grasp would
+/// Tolerance of clearance from hands while the grace lasts, in metres: a headset's noise, and a sway where every other grasp would
 /// be touched by it, too.
 const GRACE: Grace = Grace {
     always: 0.001,
     alone: 0.012,
 };
 
-/// Longest time between frames of which a single one may be wrong: five at 90 Hz. What is still so after more is real.
+/// Longest time between frames of which a single one may be wrong: five at 90 Hz.
 const MAX_SINGLE_GAP: Duration = Duration::from_millis(50);
 
-/// What a track remembers from one answer to the next.
+/// The state of a track between answers.
 #[derive(Debug, Default)]
 pub(crate) struct HeldGrasp {
-    /// The grasp of the last answer that had one, as it was found: repeating it from frame to frame would add up rounding.
+    /// The grasp of the last answer that had one, as found: repeating it from frame to frame would add up rounding.
     hand: Option<v1::HandPose>,
     /// When it was found.
     changed: Option<Duration>,
     /// When it was last valid without any grace.
     valid: Duration,
-    /// Whether it was so in the answer before.
+    /// Whether it was valid without grace in the previous answer.
     was_valid: bool,
-    /// From a committed grasp that failed a check until a frame says that the hand is no longer closing: how it failed.
+    /// How a committed grasp failed a check, until a frame says that the hand is not closing.
     aborted: Option<v1::CurrentGraspReport>,
     /// Whether the client has an answer with the whole grasp.
     pub is_sent: bool,
@@ -87,7 +86,7 @@ impl HeldGrasp {
         let may_change = self
             .changed
             .is_none_or(|changed| at.saturating_sub(changed) >= policy.min_dwell);
-        // Distances from a hand of the other side say nothing.
+        // Distances from the other hand mean nothing.
         let present = frame.receiving_hand.take();
         let current = v1::CurrentGrasp {
             grasp: Some(hand.clone()),
@@ -99,7 +98,7 @@ impl HeldGrasp {
         if let Some(current) = &mut query.current {
             current.grasp.grace = grace;
             if hand.object_from_wrist.is_none() {
-                // Where it is at the object of the first frame.
+                // Its place at the object of the first frame.
                 hand.object_from_wrist = Some(current.object_from_wrist);
                 hand.convention = v1::Convention::Unspecified.into();
             }
@@ -107,7 +106,7 @@ impl HeldGrasp {
         Ok(())
     }
 
-    /// How much too close to a hand the grasp may be now: anything in a single frame, then a little, in the end nothing.
+    /// The tolerance of the grasp's clearance: any in a single frame, then a little, in the end none.
     fn grace(&self, at: Duration, grace: Duration) -> Grace {
         let since = at.saturating_sub(self.valid);
         if grace.is_zero() {
@@ -124,7 +123,7 @@ impl HeldGrasp {
         }
     }
 
-    /// True if the committed grasp failed a check, and the hand still goes on closing: it is not taken up again.
+    /// True if the committed grasp failed a check and the hand is still closing: it is not resumed.
     pub(crate) fn is_aborted(&mut self, is_committed: bool) -> bool {
         if !is_committed {
             self.aborted = None;
@@ -132,7 +131,7 @@ impl HeldGrasp {
         self.aborted.is_some()
     }
 
-    /// The report on an aborted grasp that was looked at again: what is in the way now.
+    /// The report on an aborted grasp after another check: the check that it fails.
     pub(crate) fn still_aborted(&self, report: v1::CurrentGraspReport) -> v1::CurrentGraspReport {
         let before = self.aborted.as_ref();
         v1::CurrentGraspReport {
@@ -183,7 +182,7 @@ pub(crate) struct RecentHands {
 }
 
 impl RecentHands {
-    /// Adds the hands of a frame, and tells its query where they were. Meshes are not remembered.
+    /// Adds the hands of a frame, and gives its query their past places. Meshes are not remembered.
     pub(crate) fn add(&mut self, at: Duration, query: &mut FindQuery) {
         // After a restart of the clock, hands seen before are later than this frame.
         let is_recent = |&(seen, _): &(Duration, _)| seen <= at && at.saturating_sub(seen) <= REMEMBERED;

@@ -1,4 +1,4 @@
-//! Where object and givers will be when an answer is shown, by the velocity that they have; and how far off that was.
+//! Predicts where object and givers will be when an answer is shown, from their velocities; and measures the errors.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -10,43 +10,43 @@ use grasp_synthesis::{
 
 use crate::validate::{FindQuery, GiverHand};
 
-/// Frames farther apart say nothing about what was between them, nor about a velocity.
+/// Largest gap between frames from which motion is derived.
 const MAX_GAP: Duration = Duration::from_millis(250);
 
 /// Most predictions that wait for their time: half a second at 90 Hz, and some more.
 const MAX_PREDICTIONS: usize = 64;
 
-/// Velocities are taken over this time: four frames at 90 Hz. Less turns a headset's noise of a millimetre into one of decimetres per
-/// second, more lags behind a hand that turns.
+/// Velocities are taken over this time: four frames at 90 Hz. Less turns a headset's noise of a millimetre into decimetres per
+/// second, more lags behind a turning hand.
 const VELOCITY_OVER: Duration = Duration::from_millis(45);
 
-/// Measurements less apart than this are no base for a velocity, for the same reason.
+/// Shortest time between measurements for a velocity, because of noise.
 const MIN_BASE: f32 = 0.01;
 
-/// Measurements less apart are not kept.
+/// Shortest time between kept measurements.
 const MIN_APART: Duration = Duration::from_millis(5);
 
-/// Longest time between two measurements of a tracker that is slower than the frames, which repeat them.
+/// Longest period of a tracker that is slower than the frames, which repeat its measurements.
 const MAX_REPEAT: Duration = Duration::from_millis(50);
 
-/// How many times as long as between two measurements a body that stays where it was is not at rest.
+/// A body that repeats for this multiple of the longest time between measurements is at rest.
 const LATE: f32 = 1.45;
 
 /// Most measurements kept: [`MAX_GAP`] at 90 Hz.
 const MAX_SEEN: usize = 24;
 
-/// What a hand can do, per second and per second squared, and what noise adds, in metres and in radians: a larger step is a jump.
+/// Limits of a hand per second and per second squared, and noise, in metres and in radians: a larger step is a jump.
 const MAX_SPEED: [f32; 2] = [10.0, 40.0];
 const MAX_ACCELERATION: [f32; 2] = [150.0, 1500.0];
 const NOISE: [f32; 2] = [0.01, 0.1];
 
-/// How many times as large as its standard error a velocity must be to count: noise alone is so large in one of ten frames.
+/// Least ratio of a velocity to its standard error: noise alone exceeds it in one of ten frames.
 const SIGNIFICANT: f32 = 3.0;
 
-/// Difference of coordinates up to which a pose is a repeated one: rounding.
+/// Difference of coordinates due to rounding, up to which poses are repeated.
 const ROUNDING: f32 = 1e-6;
 
-/// What moves in a track.
+/// The motion of a track's object and hands.
 #[derive(Debug, Default)]
 pub(crate) struct Motion {
     ahead: Duration,
@@ -56,7 +56,7 @@ pub(crate) struct Motion {
     before: Option<State>,
     /// Oldest first.
     predictions: VecDeque<State>,
-    /// How far off the last prediction was whose time has come.
+    /// The error of the last prediction whose time has come.
     pub last_error: Option<PredictionError>,
 }
 
@@ -79,7 +79,7 @@ pub(crate) struct PredictionError {
 }
 
 impl Motion {
-    /// Nothing was seen yet. Predictions are `ahead` of frames.
+    /// A track without frames. Predictions are `ahead` of frames.
     pub(crate) fn new(ahead: Duration) -> Self {
         Self {
             ahead,
@@ -87,7 +87,7 @@ impl Motion {
         }
     }
 
-    /// Adds a frame, and moves its query on to the predicted time. It stays as it is while no velocity is known.
+    /// Adds a frame, and moves its query to the predicted time. It stays as it is while no velocity is known.
     pub(crate) fn predict(&mut self, at: Duration, query: &mut FindQuery) {
         let now = State::of(at, query);
         let object = Body::Rigid(now.client_from_object);
@@ -119,13 +119,13 @@ impl Motion {
             self.predictions.push_back(predicted);
         }
         self.before = Some(now);
-        // A frame that comes no more leaves its prediction unanswered.
+        // A missing frame leaves its prediction unanswered.
         if self.predictions.len() > MAX_PREDICTIONS {
             self.predictions.pop_front();
         }
     }
 
-    /// Compares the predictions whose time has come with what is now and was before.
+    /// Compares predictions with the states around their time.
     fn compare(&mut self, now: &State) {
         while let Some(prediction) = self
             .predictions
@@ -151,7 +151,7 @@ fn body_of(hand: &GiverHand, client_from_object: Pose) -> Body {
     }
 }
 
-/// Moves a hand that is as `now` to where `predicted` is.
+/// Moves a hand from its pose in `now` to that in `predicted`.
 fn apply(predicted: Body, now: &Body, hand: &mut GiverHand) {
     match (predicted, hand) {
         (Body::Joints(joints), GiverHand::Jointed(hand)) => hand.joints = *joints,
@@ -175,7 +175,7 @@ impl State {
         }
     }
 
-    /// Moves a query that is as `now` to where this is.
+    /// Moves a query from the state `now` to this one.
     fn apply(self, now: &Self, query: &mut FindQuery) {
         query.client_from_object = self.client_from_object;
         let hands = query.presenting_hand.iter_mut().map(Some);
@@ -189,7 +189,7 @@ impl State {
         }
     }
 
-    /// The distance of this prediction from what was between two frames, `share` of the time after the first.
+    /// The distance of this prediction from the motion between two frames, `share` of the time after the first.
     fn error<'a>(&'a self, before: &'a Self, after: &'a Self, share: f32) -> PredictionError {
         let [from, to] = [before, after].map(|state| state.client_from_object);
         let position = from.position.lerp(to.position, share);
@@ -229,7 +229,7 @@ enum Body {
 struct Path(VecDeque<(Duration, Body)>);
 
 impl Path {
-    /// Adds a measurement. True if it begins anew: what was before says nothing about the body's velocity.
+    /// Adds a measurement. True if it begins anew: earlier ones say nothing about the body's velocity.
     fn add(&mut self, at: Duration, body: &Body) -> bool {
         let begins = match self.0.back() {
             None => true,
@@ -290,8 +290,8 @@ impl Path {
         body.moved_on(&before, (at.saturating_sub(measured) + ahead).as_secs_f32())
     }
 
-    /// True if the measurement at a time, which is the same as the last one, is that one again: those before were as far apart, or one
-    /// of them is late.
+    /// True if a measurement equal to the last may be a repeat of it: little more than the longest time between earlier ones has
+    /// passed.
     fn is_awaited(&self, at: Duration) -> bool {
         let mut longest = Duration::ZERO;
         let mut begin: Option<&(Duration, Body)> = None;
@@ -310,7 +310,7 @@ impl Path {
             .is_some_and(|(last, _)| at.saturating_sub(*last) < longest.mul_f32(LATE))
     }
 
-    /// True if no body moves from the last measurement to another one in this time.
+    /// True if `body` is too far from `last` for a motion in this time.
     fn is_jump(&self, time: Duration, last: &Body, body: &Body) -> bool {
         let seconds = time.as_secs_f32();
         let before = self.0.iter().rev().nth(1);
@@ -323,7 +323,7 @@ impl Path {
         };
         let (mut expected, real) = (last.frame(), body.frame());
         if let (Some((before_at, before)), Some((last_at, _))) = (before, self.0.back()) {
-            // As in the step before, which lags less behind a throw than a velocity over some.
+            // As in the last step, which lags less behind a throw than a velocity over several.
             let share = seconds / last_at.saturating_sub(*before_at).as_secs_f32();
             let (from, to) = (before.frame(), expected);
             let turned = Quat::from_scaled_axis(turn(from.orientation, to.orientation) * share);
@@ -365,8 +365,8 @@ impl Body {
         }
     }
 
-    /// What it becomes in so many seconds, after it was as `before` at negative times. Of a hand, the wrist moves on as a body and
-    /// each joint turns on in its parent, so that bones keep their lengths.
+    /// This body `seconds` later, by its earlier states at negative times. A hand's wrist moves like a rigid body and each joint
+    /// turns in its parent, so that bones keep their lengths.
     fn moved_on(&self, before: &[(f32, &Self)], seconds: f32) -> Self {
         let frames = before.iter().map(|(time, body)| (*time, body.frame()));
         let frame = moved(frames, self.frame(), seconds);
@@ -406,7 +406,7 @@ fn is_same(a: Pose, b: Pose) -> bool {
     a.position.abs_diff_eq(b.position, ROUNDING) && a_turn.abs_diff_eq(b_turn, ROUNDING)
 }
 
-/// Where a frame is in so many seconds, after it was at others at negative times.
+/// A frame `seconds` later, by its earlier poses at negative times.
 fn moved(before: impl Iterator<Item = (f32, Pose)> + Clone, now: Pose, seconds: f32) -> Pose {
     let ways = before
         .clone()
@@ -426,7 +426,7 @@ fn turn(from: Quat, to: Quat) -> Vec3 {
     turn.to_scaled_axis()
 }
 
-/// The slope of the line through values at times, the last of which is 0 at 0; less the more their noise explains it.
+/// The slope of the line through values at times, the last of which is 0 at 0; shrunk as far as noise explains it.
 fn velocity(before: impl Iterator<Item = (f32, Vec3)> + Clone) -> Vec3 {
     let all = before.chain([(0.0, Vec3::ZERO)]);
     let count = all.clone().count() as f32;

@@ -1,8 +1,8 @@
 //! Pages in browsers: who may call, how browsers learn it, and the refusal of other protocols than gRPC and gRPC-Web.
 //!
-//! gRPC-Web itself is a layer of tonic-web. A browser names the page's origin with every call. Pages of other origins than
-//! those of the configuration are refused here: cross-origin rules alone would only keep them from reading the answer, and
-//! not even that once a name of theirs leads to this server.
+//! gRPC-Web itself is a layer of tonic-web. A browser names the page's origin with every call. Pages of other origins than those of
+//! the configuration are refused here: cross-origin rules alone would only keep them from reading the answer, and not even that
+//! once their own host name resolves to this server (DNS rebinding).
 
 mod origins;
 
@@ -23,7 +23,7 @@ use crate::{
 pub use origins::WebOrigins;
 pub(crate) use origins::{NEEDED_ORIGINS, parse_origins};
 
-/// How long a browser may remember what it may send; the longest that browsers accept.
+/// How long a browser may cache the rules; the longest that browsers accept.
 const REMEMBERED: Duration = Duration::from_hours(2);
 
 /// Headers of requests that pages may set: those of gRPC-Web's clients, and of the Connect protocol's, so that they can read why they
@@ -91,7 +91,7 @@ pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> Around<Refusal> {
     })
 }
 
-/// Refuses requests by a check of their headers, which may set them right.
+/// Refuses requests by a check of their headers, which may also correct them.
 #[derive(Clone)]
 pub(crate) struct Refusal(Arc<Check>);
 
@@ -146,7 +146,7 @@ pub(crate) fn refuse_protocols(is_web: bool) -> Around<Refusal> {
     })
 }
 
-/// What is wrong with a request: the status of its answer, and the cause.
+/// Why a request is refused: the status of its answer, and the cause.
 fn wrong(request: &mut Parts, is_web: bool) -> Option<(StatusCode, String)> {
     let spoken = if is_web {
         "this server speaks gRPC over HTTP/2, and gRPC-Web"

@@ -7,7 +7,7 @@ pub(crate) const NEEDED_ORIGINS: &str =
 
 const LOOPBACK_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "[::1]"];
 
-/// The origins of pages that may call; without any, browsers are not served at all.
+/// The origins of pages that may call; without any, browsers are not served.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WebOrigins {
     /// Every page.

@@ -1,4 +1,4 @@
-//! The binary: exit codes, messages, signals, health checks, and what it bears.
+//! The binary: exit codes, messages, signals, health checks, and memory limits.
 #![cfg(target_os = "linux")]
 
 mod stress;
@@ -117,7 +117,7 @@ fn health_check_passes_while_the_server_runs() {
     assert!(text.starts_with("error: cannot connect to 127.0.0.1:"), "{text}");
 }
 
-/// A command that has no setting of the store, but a home.
+/// A command without a setting of the store, but with a home.
 const DEFAULT_STORE: &str = "unset GRASP_STORE; exec grasp-server";
 
 #[test]
@@ -177,7 +177,7 @@ fn every_signal_to_end_drains_even_when_nobody_reads_the_log() {
         }
     }
     let mut server = Running::start(&[("GRASP_LISTEN", "127.0.0.1:0")]);
-    // As a terminal that is closed does.
+    // As a closed terminal does.
     server.log = None;
     server.end_by("HUP");
 }

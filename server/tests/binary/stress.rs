@@ -163,8 +163,7 @@ fn hills(id: &str, cells: usize) -> v1::CreateObjectRequest {
     request
 }
 
-/// Calls on a connection of their own, on which the client lets the server send so much of each answer. Without the
-/// calls, it ends.
+/// Calls on a connection of their own, each answer with a window of `window` bytes. The connection ends with the calls.
 async fn ask(address: &str, window: u32) -> JoinSet<()> {
     let endpoint = Endpoint::from_shared(format!("http://{address}")).expect("it is an address");
     let endpoint = endpoint.initial_stream_window_size(window);

@@ -32,7 +32,7 @@ struct Call {
 }
 
 impl Call {
-    /// A call of a method, which is answered at once with the begin of a stream, or never.
+    /// A call of a method. It is answered at once with the start of a stream, or never.
     fn new(calls: &Calls, path: &str, is_answered: bool) -> Self {
         let request = Request::builder().uri(path).header("grpc-timeout", "3S");
         let (parts, receiver) = mpsc::channel(8);
@@ -88,9 +88,9 @@ fn delay_of_an_answer_counts_from_the_end_of_its_search() {
     let (hour, second) = (Duration::from_hours(1), Duration::from_secs(1));
     let past = now.checked_sub(second).unwrap();
     for (due, ended, is_late) in [
-        // A search that ended a second before, and had an hour left.
+        // A search that ended a second ago, with an hour left.
         (now + hour, Some(past), true),
-        // One that runs, dropped before it has to end.
+        // A running search, dropped before its deadline.
         (now + hour, None, false),
         // A time before the start of the search counts as its start.
         (past, None, false),
@@ -141,7 +141,7 @@ async fn delay_of_a_stream_adds_up_while_the_transport_waits() {
     let pause = Duration::from_millis(20);
     call.context()
         .search_is_due(Instant::now() + Duration::from_hours(1));
-    // Grasps come while the search runs.
+    // Grasps arrive while the search runs.
     assert!(!poll(&mut body));
     call.send("a grasp");
     assert!(poll(&mut body) && !poll(&mut body));

@@ -123,7 +123,7 @@ fn reports_how_far_off_a_sudden_stop_was() {
 }
 
 #[test]
-fn moves_meshes_with_what_they_hold() {
+fn moves_meshes_with_the_held_object() {
     let vertices = [Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.1, Vec3::Z * 0.1];
     let mesh = |pose: Pose| v1::HandMesh {
         client_coordinates: vertices
@@ -183,7 +183,7 @@ fn predicted(frames: impl IntoIterator<Item = (Duration, Pose)>) -> Vec<Pose> {
 }
 
 #[test]
-fn what_no_hand_does_is_a_new_start() {
+fn impossible_motions_start_anew() {
     let still = Pose::from_position(Vec3::new(0.2, 1.0, 0.0));
     let turned = |angle| Pose::new(Vec3::ZERO, Quat::from_rotation_y(angle));
     let jumps = [
@@ -239,7 +239,7 @@ fn repeated_measurements_are_as_old_as_the_first_of_them() {
     for (frame, answer) in (0..).zip(&answers).skip(8) {
         assert_same(*answer, turning(at(frame) + AHEAD), 1e-3);
     }
-    // What stops is at rest soon.
+    // A body that stops is at rest soon.
     let stopped = |frame: u64| measured(frame.min(20));
     let answers = predicted((0..40).map(|frame| (at(frame), stopped(frame))));
     for answer in &answers[24..] {
