@@ -1,4 +1,4 @@
-//! Answers, by what they are mostly read for.
+//! Accessors of answers.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use crate::{
 };
 
 impl v1::FindGraspResponse {
-    /// The grasp that was found: with both hands, the first one's.
+    /// The grasp found: with both hands, the first one's.
     #[must_use]
     pub fn grasp(&self) -> Option<&v1::Grasp> {
         self.grasps.first()
@@ -22,7 +22,7 @@ impl v1::FindGraspResponse {
         self.grasp()?.hand.as_ref()
     }
 
-    /// What became of the request's current grasp; unspecified if it has none.
+    /// Status of the request's current grasp; unspecified if it has none.
     #[must_use]
     pub fn status(&self) -> v1::CurrentGraspStatus {
         let report = self.current.as_ref();
@@ -114,7 +114,7 @@ impl v1::Contact {
 }
 
 impl v1::TrackAnswer {
-    /// What became of the grasp; unspecified for a frame that a later one overtook.
+    /// Status of the grasp; unspecified for a frame that a later one overtook.
     #[must_use]
     pub fn status(&self) -> v1::CurrentGraspStatus {
         let report = self.current.as_ref();

@@ -9,7 +9,7 @@ use crate::{
     values::{std_duration, wire_duration},
 };
 
-/// What requests of the same parts have in common.
+/// Methods of requests that have a holdout, a receiver, requirements and output options.
 macro_rules! parts {
     ($($request:ident),*) => {$(
         impl v1::$request {
@@ -21,7 +21,7 @@ macro_rules! parts {
                 }
             }
 
-            /// What is held out, to change it.
+            /// The holdout, to change it.
             pub fn holdout_mut(&mut self) -> &mut v1::Holdout {
                 self.holdout.get_or_insert_default()
             }
@@ -31,7 +31,7 @@ macro_rules! parts {
                 self.receiver.get_or_insert_default()
             }
 
-            /// What grasps must satisfy, to change it.
+            /// Constraints on grasps, to change them.
             pub fn requirements_mut(&mut self) -> &mut v1::Requirements {
                 self.requirements.get_or_insert_default()
             }
@@ -99,7 +99,7 @@ parts!(
     EvaluateHoldoutRequest
 );
 
-/// What requests that search have in common.
+/// Methods of requests that have search options.
 macro_rules! searches {
     ($($request:ident),*) => {$(
         impl v1::$request {
@@ -176,7 +176,7 @@ impl v1::Receiver {
 }
 
 impl v1::CurrentGrasp {
-    /// A grasp to hold on to while it is valid. What only answers have of it is left out.
+    /// A grasp to hold on to while it is valid. Fields that only answers have are left out.
     #[must_use]
     pub fn new(grasp: v1::HandPose) -> Self {
         let grasp = v1::HandPose {
@@ -255,7 +255,7 @@ same_holdout! {
     EvaluateHoldoutRequest { holdout, receiver, requirements, search, output }
 }
 
-/// The same holdout and current grasp, without what comes with frames.
+/// The same holdout and current grasp, without the parts that come with frames.
 impl From<v1::FindGraspRequest> for v1::Track {
     fn from(request: v1::FindGraspRequest) -> Self {
         let current = request.current.unwrap_or_default();
@@ -279,7 +279,7 @@ impl From<v1::FindGraspRequest> for v1::Track {
 }
 
 impl v1::TrackFrame {
-    /// A frame of a holdout, without what is the track's.
+    /// A frame of a holdout, without the parts that the track has.
     #[must_use]
     pub fn of(sequence: u64, holdout: v1::Holdout) -> Self {
         Self {

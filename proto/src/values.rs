@@ -1,6 +1,6 @@
 //! Values of messages: numbers, poses, hands and parts of space.
 //!
-//! Methods that have the name of a field return what it means: an absent position is the origin, for instance.
+//! Methods named after a field return its meaning: an absent position is the origin, for instance.
 
 use std::{ops::Mul, time::Duration};
 
@@ -189,7 +189,7 @@ impl v1::DigitAngles {
 }
 
 impl v1::JointPose {
-    /// A joint at this pose, so far from the skin.
+    /// A joint at this pose, at this distance from the skin.
     #[must_use]
     pub fn new(pose: v1::Pose, radius: f32) -> Self {
         Self {

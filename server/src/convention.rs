@@ -172,7 +172,7 @@ impl Convention {
         joint
     }
 
-    /// The turn from the frame that the engine's own axes give an object to the one that its importer gives it.
+    /// The rotation of an object's frame from the engine's own axes to those of its importer.
     fn importer_turn(self) -> Quat {
         match self {
             Self::OpenXr | Self::Unity | Self::Unreal | Self::Godot => Quat::IDENTITY,
@@ -241,8 +241,7 @@ mod tests {
     use super::*;
     use crate::validate::fixtures::CONVENTIONS;
 
-    /// The documented change of basis, written independently as a matrix whose columns are the `OpenXR` axes in the
-    /// engine's.
+    /// The documented change of basis, written independently: the columns are the `OpenXR` axes in the engine's.
     fn engine_from_openxr(convention: Convention) -> Mat3 {
         match convention {
             Convention::OpenXr | Convention::Godot => Mat3::IDENTITY,

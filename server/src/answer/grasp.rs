@@ -114,7 +114,7 @@ pub(super) fn wire_hand(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> 
     .with_digits(wire_digits(rig, pose))
 }
 
-/// A hand of which only the wrist's place is of interest.
+/// A hand with only its wrist's pose.
 pub(super) fn wire_wrist(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> v1::HandPose {
     let rig: &Rig = &hand.hand.rig;
     let convention = frame.convention;

@@ -167,7 +167,7 @@ pub(crate) fn atlas_used(
         .then(|| wire_atlas(object_id, handedness, atlas.map(|atlas| &**atlas), learned))
 }
 
-/// The known grips of an object and a hand; whether they become more is not said.
+/// The known grips of an object and a hand, without the atlas's growth.
 pub(crate) fn wire_atlas(
     object_id: &str,
     handedness: Handedness,

@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn margins_have_what_was_measured_and_settle_by_verdicts() {
+    fn margins_have_measured_values_and_settle_by_verdicts() {
         use v1::Check as C;
         let margins = PhysicalMargins {
             residual: 0.01,

@@ -29,7 +29,7 @@ impl Violation {
     }
 }
 
-/// The number of violations, with those that are only counted.
+/// The number of violations, listed and unlisted.
 fn count(violations: &[Violation]) -> usize {
     violations.iter().map(|violation| 1 + violation.unlisted).sum()
 }

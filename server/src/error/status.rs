@@ -136,8 +136,8 @@ fn metadata(error: &E) -> HashMap<String, String> {
         .collect()
 }
 
-/// Replaces the answers of the transport to bytes that are no message, `INTERNAL` as if the server had failed, and to messages of
-/// more than `limit` bytes. Every other status in the headers of a response comes from a handler, and has details.
+/// Replaces the transport's errors for malformed messages (`INTERNAL`, as if the server had failed) and for messages of more than
+/// `limit` bytes. Every other status in the headers of a response comes from a handler, and has details.
 pub(crate) fn blame_client<R: Default>(response: Response<R>, limit: usize) -> Response<R> {
     let Some(status) = Status::from_header_map(response.headers()) else {
         return response;
@@ -184,8 +184,8 @@ fn clipped_by(text: &str, most: usize, units: impl Fn(char) -> usize) -> String 
     text.to_owned()
 }
 
-/// The violations that the details list, in their order: of each kind the first, then of each kind the second and so on, as far as there is room. If
-/// any are left out, the last entry says how many, and has no field.
+/// The violations that the details list, in their order: the first of each kind, then the second of each and so on, while there is
+/// room. If any are left out, the last entry says how many, and has no field.
 pub(super) fn listed(violations: &[Violation]) -> Vec<FieldViolation> {
     let entry = |violation: &Violation| {
         let field = clipped(&violation.field, MAX_FIELD);
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_transport_answers_without_details_is_the_clients_fault() {
+    fn errors_of_the_transport_without_details_are_the_clients_fault() {
         let code_after = |status: Status| {
             let response = blame_client(status.into_http::<()>(), 77);
             let status = Status::from_header_map(response.headers()).expect("it has a status");

@@ -32,7 +32,7 @@ pub(crate) struct CurrentGraspQuery {
     pub handedness: Handedness,
     /// The grasp, in the object's frame.
     pub grasp: CurrentGrasp,
-    /// The wrist in the answer's convention, as the client gave it if it is in that.
+    /// The wrist in the answer's convention, as sent if it was in that.
     pub object_from_wrist: v1::Pose,
 }
 
@@ -131,7 +131,7 @@ pub(super) fn check_is(field: Field<'_>, hand: &PosedHand, receiving: &RigHand, 
         .check(chooses_hand || hand.handedness == rig.handedness, text);
 }
 
-/// The wrist of a grasp that is kept, in the answer's convention: conversion there and back would move it a little with every request.
+/// The wrist of a kept grasp, in the answer's convention: a round trip of conversions would move it a little with every request.
 fn answered_wrist(sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames<'_>) -> v1::Pose {
     let as_answered = [0, frames.convention.to_wire().into()];
     match sent.object_from_wrist {
@@ -143,7 +143,7 @@ fn answered_wrist(sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames<'_>) -
     }
 }
 
-/// A wrist as it is given back: unchanged if it is a rigid transform up to rounding.
+/// A wrist as it is answered: unchanged if it is a rigid transform up to rounding.
 fn rounded(sent: v1::Pose) -> v1::Pose {
     let mut turn = sent.orientation.map_or(Quat::IDENTITY, Quat::from);
     let norm = turn.length();

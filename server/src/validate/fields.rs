@@ -31,7 +31,7 @@ pub(crate) struct Violations(RefCell<FoundViolations>);
 struct FoundViolations {
     listed: Vec<Violation>,
     unlisted: usize,
-    /// Name of a rig whose record is damaged: no fault of the request, and answered before all that are.
+    /// Name of a rig whose record is damaged: not a violation, and answered before any.
     damaged_rig: Option<String>,
 }
 
@@ -63,7 +63,7 @@ impl Violations {
         found.unlisted = 0;
     }
 
-    /// Names the field `path` and those in it `new_path`.
+    /// Renames the field `path`, and with it those inside, to `new_path`.
     pub(super) fn move_path(&self, path: &str, new_path: &str) {
         for Violation { field, .. } in &mut self.0.borrow_mut().listed {
             if let Some(inside) = field.strip_prefix(path) {
@@ -72,7 +72,7 @@ impl Violations {
         }
     }
 
-    /// True if all but the first ones are of a field of this name, whatever it is in.
+    /// True if all but the first violations are of a field of this name, or inside one.
     pub(super) fn are_all_of(&self, name: &str, first: usize) -> bool {
         let found = self.0.borrow();
         let is_of = |violation: &Violation| violation.field.split('.').any(|part| part == name);
@@ -210,7 +210,7 @@ pub(super) fn check_unset<const N: usize>(parent: Field<'_>, fields: [(&str, boo
     }
 }
 
-/// True if a list has at most so many elements, which are named by `what`.
+/// True if a list has at most `most` elements, called `what` in the violation.
 pub(super) fn check_count(field: Field<'_>, count: usize, most: usize, what: &str) -> bool {
     let text = format_args!("has {count} {what}; it may have up to {most}");
     field.check(count <= most, text)

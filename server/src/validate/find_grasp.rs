@@ -51,8 +51,7 @@ pub(crate) struct FindQuery {
     pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
-    /// The search for one hand, without refinement and current grasp, and its requirements without the receiver's reach and in the
-    /// client's frame and `OpenXR` axes.
+    /// The search for one hand in the client's frame and `OpenXR` axes, without refinement, current grasp and receiver's reach.
     pub search: Query,
     /// How to run it, without seed, deadline and workers.
     pub run: Run,

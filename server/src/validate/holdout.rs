@@ -32,7 +32,7 @@ pub(super) struct Frames<'a> {
 }
 
 impl<'a> Frames<'a> {
-    /// Those of a request, without its violations.
+    /// The frames of a request; violations are dropped.
     pub(super) fn of(
         holdout: Option<&v1::Holdout>,
         sent: Option<v1::OutputOptions>,
@@ -233,7 +233,7 @@ fn solid_box(field: Field<'_>, sent: &v1::BoxShape, convention: Convention) -> O
     let sent = required(sizes_field, sent.half_extents)?;
     let half_extents = sizes_field.if_right(|| finite(sizes_field, sent));
     if let Some(half_extents) = half_extents {
-        // The first that is wrong stands for all.
+        // Only the first wrong size is reported.
         let mut sizes = half_extents.to_array().into_iter();
         sizes.all(|size| check_positive(sizes_field, size, convention.length_from_openxr(FARTHEST)));
     }
@@ -244,7 +244,7 @@ fn solid_box(field: Field<'_>, sent: &v1::BoxShape, convention: Convention) -> O
     })
 }
 
-/// The hands beside the presenting one, in the client's frame and `OpenXR` axes, without those that are wrong.
+/// The hands beside the presenting one, in the client's frame and `OpenXR` axes, without wrong ones.
 pub(super) fn other_hands(
     field: Field<'_>,
     (presenting, sent): (Option<&GiverHand>, Vec<v1::PresentingHand>),
@@ -258,7 +258,7 @@ pub(super) fn other_hands(
     hands
 }
 
-/// The obstacles, in the client's frame and `OpenXR` axes, without those that are wrong, and the place of each in the request.
+/// The obstacles, in the client's frame and `OpenXR` axes, without wrong ones, and the place of each in the request.
 pub(super) fn obstacles(
     field: Field<'_>,
     sent: &[v1::Shape],

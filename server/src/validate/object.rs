@@ -39,7 +39,7 @@ pub(crate) struct ObjectFields {
     pub id: String,
     pub mesh: Vec<u8>,
     pub import: Import,
-    /// The names of the file's parts that are the object; empty for those that are seen.
+    /// The names of the file's parts that are the object; empty for all visible ones.
     pub parts: Vec<String>,
     pub mass: f32,
     /// Centre of mass in metres, in the object's frame; `None` to compute it.

@@ -74,8 +74,8 @@ pub(super) fn chooses_hand(sent: &v1::Receiver, validity: Validity) -> bool {
     sent.handedness == 0 && !sent.both_hands && validity == Validity::Physical
 }
 
-/// The hand to pose and the same person's other one, by default of the default rig or, under THESIS validity, of chapter 5's; the right
-/// one first unless the request names the left one.
+/// The hand to pose and the same person's other hand, right first unless the request names the left. THESIS validity defaults to
+/// the rig of chapter 5.
 pub(super) fn receiving_hands(
     field: Field<'_>,
     sent: &v1::Receiver,
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_excludes_what_does_not_know_it() {
+    fn a_body_excludes_unsupported_fields() {
         let around = surroundings(Convention::OpenXr);
         let (mut thesis, mut lost) = (around, around);
         thesis.validity = Validity::Thesis;

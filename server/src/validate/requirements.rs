@@ -175,7 +175,7 @@ pub(super) fn check_no_experiment(sent: Option<&v1::Requirements>, v: &Violation
     let Some(sent) = sent.and_then(|sent| sent.thesis) else {
         return;
     };
-    // Values that the contract does not define are found wrong elsewhere.
+    // Undefined values are rejected elsewhere.
     let strategy = !matches!(sent.strategy(), v1::Strategy::Unspecified | v1::Strategy::Guided);
     let ratios = sent.bend_ratios() != v1::BendRatios::Unspecified;
     let is_set = [

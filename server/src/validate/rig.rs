@@ -222,7 +222,7 @@ fn mapped_joint(field: Field<'_>, mapped: v1::RigNode) -> MappedJoint {
 
 fn limits(sent: &[v1::DigitLimits], violations: &Violations) -> [Option<DigitLimits>; 5] {
     let mut limits = [None; 5];
-    // Of more than five, one comes again.
+    // More than five repeat a digit.
     for (place, sent) in sent.iter().take(6).enumerate() {
         let field = violations.field("limits").at(place);
         let given = digit_limits(field, sent);

@@ -139,7 +139,7 @@ pub(crate) fn evaluate_query(
         let is_replay = [("replay_attempt", search.replay_attempt.take().is_some())];
         check_unset(v.field("search"), is_replay, why_not);
         search.max_attempts = None;
-        // It has no effect. One that the contract does not define stays, to be found wrong.
+        // It has no effect. An undefined value stays, to be rejected.
         if v1::GraspChoice::try_from(search.choice).is_ok() {
             search.choice = 0;
         }
@@ -221,7 +221,7 @@ pub(crate) fn validate_query(
     let budget = nearest_budget.and_then(|sent| positive_duration(v.field("nearest_budget"), sent));
     check_no_experiment(request.requirements.as_ref(), v);
     check_one_hand(Some(receiver), v);
-    // A wrong grasp says nothing of the receiver.
+    // A wrong grasp does not tell the receiver.
     if let Some(hand) = hand.filter(|_| given.is_some()) {
         settle_receiver(receiver, &hand, v);
     }
@@ -242,7 +242,7 @@ pub(crate) fn validate_query(
 /// Makes the receiver the one whose hand the grasp is of. The request must not contradict the grasp.
 fn settle_receiver(sent: &mut v1::Receiver, given: &v1::Receiver, v: &Violations) {
     let field = v.field("receiver");
-    // A value that the contract does not define stays, to be found wrong.
+    // An undefined value stays, to be rejected.
     if let Ok(named) = v1::Handedness::try_from(sent.handedness) {
         let [named, hand] = [named, given.handedness()].map(|side| side.as_str_name());
         let text = format_args!("is {named}, but the grasp is of {hand}; leave it out");

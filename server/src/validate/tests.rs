@@ -1,4 +1,4 @@
-//! Requests that are right, with one thing after the other made wrong.
+//! Valid requests, made wrong in one field after the other.
 
 pub(crate) mod fixtures;
 
@@ -200,7 +200,7 @@ fn other_hands(request: &mut Request, count: usize) {
     request.holdout_mut().other_hands = vec![hand; count];
 }
 
-/// Some tubes of so many points.
+/// Some tubes of this many points.
 fn obstacle_of(request: &mut Request, points: usize, tubes: usize) {
     let tube = v1::Shape::tube(vec![Vec3::ZERO; points], 0.1);
     request.holdout_mut().obstacles = vec![tube; tubes];
@@ -293,7 +293,7 @@ fn every_field_of_a_search_is_checked() {
 }
 
 #[test]
-fn everything_that_is_wrong_is_said_at_once() {
+fn all_violations_are_reported_at_once() {
     let mut request = valid();
     request.output_mut().convention = 99;
     request.holdout_mut().scale = Some(9.0);
@@ -324,7 +324,7 @@ fn a_hand() -> v1::HandPose {
     stretched_hand(v1::Handedness::Right).with_object_from_wrist(v1::Pose::default())
 }
 
-/// A search with all that only `FindGrasp`, or only a search for a first grasp, has.
+/// A search with every option that only `FindGrasp`, or only a search for a first grasp, supports.
 fn experiment() -> Request {
     let mut request = Request::new("objects/remote").with_key_frames();
     *thesis(&mut request) = v1::ThesisOptions {
@@ -339,7 +339,7 @@ fn experiment() -> Request {
 }
 
 #[test]
-fn thesis_and_both_hands_exclude_what_they_do_not_know() {
+fn thesis_and_both_hands_exclude_unsupported_fields() {
     let mut request = experiment().with_obstacle(v1::Shape::ball(Vec3::ZERO, 0.1));
     request.holdout_mut().other_hands = vec![a_hand().into()];
     // Of another rig than the thesis'.
@@ -390,7 +390,7 @@ fn choices_keep_their_meaning() {
 }
 
 #[test]
-fn streams_evaluations_and_validations_refuse_what_they_cannot_do() {
+fn streams_evaluations_and_validations_refuse_unsupported_fields() {
     let rigs = ("rigs/adult", &RigStore::new(1, None));
     let mut request = experiment();
     request.search_mut().set_choice(v1::GraspChoice::Reproducible);

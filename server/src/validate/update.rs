@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_mask_what_is_present_changes() {
+    fn without_a_mask_present_fields_change() {
         let query = update_query(request(&[])).unwrap();
         let expected = ObjectChange {
             mass: Some(0.2),

@@ -137,8 +137,8 @@ pub(super) struct StrayJoint {
     pub limit: f32,
 }
 
-/// All joints that cannot be where they are; `trusted` are those to examine, and afterwards those that are right. One joint after the
-/// other is taken out, always the one with the largest share of impossible bones, until the bones between the others are possible.
+/// All joints in impossible places; `trusted` are the joints to examine, and afterwards the right ones. Removes the joint with the
+/// largest share of impossible bones, again and again, until all bones between the others are possible.
 pub(super) fn strays(positions: &PerJoint<Vec3>, trusted: &mut PerJoint<bool>) -> Vec<StrayJoint> {
     let mut strays = Vec::new();
     // Joints at zero may be lost; the hand's size is that of the others, if there are any.
@@ -169,8 +169,7 @@ struct Tally {
     worst: Option<StrayJoint>,
 }
 
-/// The trusted joint with the largest share of impossible bones, if there are any; among equals, one at zero, then the
-/// one with the most.
+/// The trusted joint with the largest share of impossible bones; ties go to joints at zero, then to the most impossible bones.
 fn worst(positions: &PerJoint<Vec3>, trusted: &PerJoint<bool>, scale: f32) -> Option<StrayJoint> {
     let mut tallies = [Tally::default(); JOINT_COUNT];
     let at_zero = |joint: usize| positions[joint] == Vec3::ZERO;
@@ -265,7 +264,7 @@ pub(super) struct Axes {
 }
 
 /// Examines the axes of the `trusted` joints: `OpenXR`'s look along -Z to the tip, with +Y out of the back of the hand.
-/// `is_identity` are those that were sent with the identity as orientation.
+/// `is_identity` are the joints that were sent with the identity as orientation.
 pub(super) fn axes(
     joints: &PerJoint<Joint>,
     trusted: &PerJoint<bool>,

@@ -102,7 +102,7 @@ pub(super) fn presenting_hand(
     jointed.map(|hand| GiverHand::Jointed(Box::new(hand)))
 }
 
-/// Further hands, at most so many, without those that are wrong.
+/// Further hands, at most this many, without wrong ones.
 pub(super) fn presenting_hands(
     field: Field<'_>,
     sent: Vec<v1::PresentingHand>,

@@ -25,7 +25,7 @@ const NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate) enum AngleBounds {
-    /// The limits of the rig. Of one that is not known: half a turn.
+    /// The limits of the rig; half a turn if it is unknown.
     Rig,
     HalfTurn,
 }
@@ -40,7 +40,7 @@ pub(in crate::validate) struct PosedHand {
     pub pose: HandPose,
 }
 
-/// Where a hand is wanted, and which of its wrists counts if both are given.
+/// The frame to read a hand in, and the wrist that counts if both are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate) enum Place {
     /// In the client's frame, by `client_from_wrist`.
@@ -101,7 +101,7 @@ pub(in crate::validate) fn convention_of(
     }
 }
 
-/// The wrist of a hand that counts, in the frame that is wanted; `None` if there is neither.
+/// The wrist that counts, in the requested frame; `None` if there is neither.
 fn wrist(
     field: Field<'_>,
     sent: &v1::HandPose,
@@ -134,7 +134,7 @@ fn wrist(
 pub(in crate::validate) fn wrist_at_object(field: Field<'_>, sent: v1::Pose, convention: Convention) -> Pose {
     let wrist = pose(field, Some(sent), convention);
     let mut object_from_wrist = thesis_from_openxr_frame(convention.joint_at_object_to_openxr(wrist));
-    // Of the two quaternions of an orientation, the one that is answered with the given sign: others would seem to jump.
+    // Of an orientation's two quaternions, keep the sign that the answer repeats: the other would seem to jump.
     let answered = convention.joint_at_object_from_openxr(openxr_from_thesis_frame(object_from_wrist));
     if answered.orientation.dot(wrist.orientation) < 0.0 {
         object_from_wrist.orientation = -object_from_wrist.orientation;
@@ -157,8 +157,8 @@ pub(super) fn jointed_hand(
     })
 }
 
-/// The digits of the hand at `field`, thumb first. Those that the rig has are required, and others ignored: they are as if
-/// stretched. With a rig that is not known, none is required.
+/// The digits of the hand at `field`, thumb first. Digits that the rig has are required; others are ignored, and taken as
+/// stretched. With an unknown rig, none is required.
 pub(in crate::validate) fn checked_digits(
     field: Field<'_>,
     sent: &v1::HandPose,
@@ -248,7 +248,7 @@ mod tests {
     fn one_wrist_counts_in_the_messages_own_convention() {
         let rigs = RigStore::new(1, None);
         let (client_from_object, [in_client, at_object]) = (somewhere(1.0), [2.0, 3.0].map(somewhere));
-        // Those of the request, and of the hand; the request's if it has none.
+        // Conventions of the request and of the hand, by default the request's.
         let named = |one: Convention| CONVENTIONS.map(|other| (one, other.to_wire(), other));
         let unnamed = CONVENTIONS.map(|one| (one, v1::Convention::Unspecified, one));
         for (of_request, own, convention) in CONVENTIONS.into_iter().flat_map(named).chain(unnamed) {
@@ -314,7 +314,7 @@ mod tests {
             ..angles
         };
         assert_eq!(read(&over, AngleBounds::Rig).1, ["hand.second_pitch"]);
-        // Where they are only to be read, they stay as they are.
+        // Bounds of half a turn leave them unchanged.
         let (unbounded, blamed) = read(&over, AngleBounds::HalfTurn);
         assert!(blamed.is_empty());
         assert_eq!(unbounded.second_pitch, over.second_pitch);

@@ -76,10 +76,10 @@ macro_rules! table {
 }
 pub(crate) use table;
 
-/// A field, what is said of it, and what makes it wrong.
+/// A field, the text of its violation, and the change that makes it wrong.
 pub(crate) type Change<M> = (&'static str, &'static str, fn(&mut M));
 
-/// A field, what is said of it, numbers that it must not be, and what makes it one.
+/// A field, the text of its violation, invalid numbers, and the setter of a number.
 pub(crate) type SetNumber<M> = (&'static str, &'static str, &'static [f32], fn(&mut M, f32));
 
 /// Fails unless each change of a right message has one violation, that of its row.

@@ -78,7 +78,7 @@ pub(super) fn parts(
 
 #[derive(Debug)]
 pub(crate) struct TrackIntake {
-    /// The track, with the replacements of frames.
+    /// The track, as changed by frames.
     track: v1::Track,
     sequence: Option<u64>,
     captured: Option<Duration>,
@@ -91,7 +91,7 @@ pub(crate) struct TrackIntake {
 }
 
 impl TrackIntake {
-    /// Of a checked track. `may_overtake` if each frame comes in a call of its own.
+    /// The intake of a checked track. `may_overtake` if each frame comes in a call of its own.
     pub(super) fn new(track: v1::Track, needs_time: bool, may_overtake: bool) -> Self {
         Self {
             track,
@@ -103,7 +103,7 @@ impl TrackIntake {
         }
     }
 
-    /// Checks a frame that arrived at a time; `None` if it may be ignored, as a later one had come before. A wrong one changes nothing.
+    /// Checks a frame; `None` if a later one came before it, so that it may be ignored. A wrong frame changes nothing.
     pub(crate) fn check(
         &mut self,
         frame: v1::TrackFrame,
@@ -260,14 +260,14 @@ fn check_receiving_hand(sent: &v1::HandPose, query: &FindQuery, rigs: &RigStore,
     let field = v.field("receiving_hand");
     let frames = Frames::of_query(query, rigs);
     if let Some(hand) = posed_hand(field, sent, Place::InClient, AngleBounds::Rig, &frames) {
-        // It may be the other hand than that of the grasp.
+        // It may be the hand opposite to the grasp's.
         check_is(field, &hand, &query.receiving_hand, true);
     }
 }
 
 #[derive(Debug, Default)]
 struct LastHands {
-    /// Whether there was a frame without lost ones.
+    /// True after a frame in which no hand was lost.
     is_known: bool,
     /// The giver's, in the object's frame: it holds the object.
     giver: Option<GiverHand>,
@@ -278,12 +278,12 @@ struct LastHands {
 #[derive(Debug, Default)]
 struct LostHands {
     giver: bool,
-    /// By their places in the frame.
+    /// Their places in the frame.
     others: Vec<usize>,
 }
 
 impl LostHands {
-    /// Takes the hands that have lost tracking out of a holdout, and adds why.
+    /// Takes the hands that have lost tracking out of a holdout, and adds the reasons.
     fn take_from(
         parent: Field<'_>,
         holdout: &mut v1::Holdout,
@@ -309,7 +309,7 @@ impl LostHands {
         }
     }
 
-    /// Puts them where they were last. Others that were never seen stay absent.
+    /// Puts them where they were last seen. Other hands that were never seen stay absent.
     fn put_back(&self, last: &LastHands, query: &mut FindQuery) {
         if self.giver
             && let Some(mut giver) = last.giver.clone()
@@ -342,10 +342,10 @@ impl LastHands {
     }
 }
 
-/// True if a hand is well-formed but nowhere that a hand can be. Adds why.
+/// True if a hand is well-formed but in an impossible place. Adds the reason.
 fn is_lost(field: Field<'_>, sent: &v1::PresentingHand, frames: &Frames<'_>) -> bool {
     let is_posed = match &sent.form {
-        // As many as there should be, or none, of a known side.
+        // A full or empty list of joints, of a known side.
         Some(Form::Joints(sent))
             if sent.handedness() != v1::Handedness::Unspecified
                 && matches!(sent.joints.len(), 0 | 25 | 26) =>
