@@ -21,7 +21,7 @@ async fn main() -> Result<(), ClientError> {
     let url = url.unwrap_or("http://[::1]:50051".to_owned());
     let client = GraspClient::connect(url).await?;
     let request = FindGraspRequest::new("objects/remote")
-        // Where the game has the object and the giver's hand; any frame will do, as long as both use the same.
+        // The object and the giver's hand in the game; any frame will do if both use it.
         .with_client_from_object(Pose::new(
             Vec3::new(-0.0009, -0.0011, -0.0001),
             Quat::from_xyzw(-0.0850, -0.7020, -0.5741, -0.4128),
@@ -64,7 +64,7 @@ fn print_grasp(grasp: &Grasp) {
     if let Some(wrist) = &hand.client_from_wrist {
         println!("wrist: {}", shown(wrist.position(), wrist.orientation()));
     }
-    // Pose the character's skeleton with these, in the order of XR_EXT_hand_tracking. Rigs of few fingers have not all of them.
+    // Pose the character's skeleton with these, in the order of XR_EXT_hand_tracking. Rigs with few fingers lack some.
     for (place, joint) in hand.posed_joints().into_iter().enumerate() {
         if let Some(joint) = joint {
             let shown = shown(joint.position(), joint.orientation());

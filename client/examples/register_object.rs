@@ -41,7 +41,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let request = FindGraspRequest::new(object.name)
         .with_presenting_hand(giver)
         .receiving(Handedness::Right)
-        // The first search on a new object may take longer: its atlas has only begun to grow.
+        // The first search on a new object may take longer: its atlas is still small.
         .with_budget(Duration::from_secs(5));
     let answer = client.find_grasp(&request).await?;
     match answer.grasp() {
@@ -60,7 +60,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Creates the object, or finds the one that an earlier run created.
+/// Creates the object, or gets it if an earlier run did.
 async fn register(client: &GraspClient, obj: Vec<u8>) -> Result<GraspObject, ClientError> {
     let mut torch = CreateObjectRequest::new("torch", obj, 0.15);
     let object = torch.object_mut();

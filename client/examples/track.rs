@@ -1,9 +1,8 @@
-//! A character that holds on to its grasp while the giver moves, and what that looks like.
+//! Keeps a character's grasp valid while the giver moves, and writes an animation.
 //!
 //! The giver walks and turns, opens and closes the fingers, and slides the hand along the object until it is in the way of the
-//! grasp, so that another one is needed. Frames are sent 90 times a second, and nobody waits for answers. A line per change says
-//! what became of the grasp. The motion is written as a binary glTF file with an animation, for Blender, three.js and other
-//! viewers.
+//! grasp, so that another one is needed. Frames are sent 90 times a second without waiting for answers. Each change of the grasp is
+//! printed. The motion is written as a binary glTF file with an animation, for Blender, three.js and other viewers.
 //!
 //! Start a server, then run the example; all arguments are optional:
 //!
@@ -41,7 +40,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let glb = next("target/track.glb");
 
     let client = GraspClient::connect(url).await?;
-    // With the way to the grasp, clear of giver and object. Without it, the hand would draw back along its own arm.
+    // Requests an approach path clear of giver and object. Without it, the hand would draw back along its own arm.
     let mut track = Track::new(OBJECT).receiving(Handedness::Right);
     track.output_mut().key_frames = true;
     let mut stream = client.track(&track).await?;
@@ -90,7 +89,7 @@ async fn play(track: &mut TrackStream, mut recording: TrackRecording) -> Result<
     Ok(recording)
 }
 
-/// Prints what became of the grasp, and why.
+/// Prints the status of the grasp, and the reason.
 fn print(answer: &TrackAnswer) {
     let current = answer.current.as_ref();
     let failed = current.and_then(|current| current.failed_check.as_ref());
@@ -103,11 +102,11 @@ fn print(answer: &TrackAnswer) {
     );
 }
 
-/// The frame of this number: where the game has giver and object.
+/// Frame number `sequence`; a game takes giver and object from its scene.
 fn frame(sequence: u64) -> TrackFrame {
     let time = FRAME * sequence as u32;
     let seconds = time.as_secs_f32();
-    // For three seconds each: a sway of a height that begins and ends at rest.
+    // A sway lasts three seconds, and begins and ends at rest.
     let sway = |start: f32| {
         let phase = ((seconds - start) / 3.0).clamp(0.0, 1.0);
         (TAU * phase).sin() * (0.5 * TAU * phase).sin()

@@ -17,7 +17,7 @@ pub enum ClientError {
     Endpoint {
         /// The endpoint as given.
         endpoint: String,
-        /// What is wrong with it.
+        /// Why it is invalid.
         source: BoxError,
     },
     /// The connection failed.
@@ -45,7 +45,7 @@ pub struct CallError {
     pub message: String,
     /// Number of attempts.
     pub attempts: u32,
-    /// Details that the server attached. Undecodable ones count as absent: the message still says what is wrong.
+    /// Details that the server attached. Undecodable ones count as absent: the message still names the error.
     pub details: ErrorDetails,
 }
 

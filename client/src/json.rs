@@ -10,13 +10,13 @@ static MESSAGES: LazyLock<DescriptorPool> = LazyLock::new(|| {
     DescriptorPool::decode(grasp_proto::FILE_DESCRIPTOR_SET).expect("the compiled contract is sound")
 });
 
-/// What is not the JSON of a message.
+/// JSON that does not match its message.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{problem}", path.as_ref().map(|path| format!("{path}: ")).unwrap_or_default())]
 pub struct JsonError {
-    /// The place in the JSON, such as `holdout.obstacles[0]`; `None` for all of it.
+    /// The path in the JSON, such as `holdout.obstacles[0]`; `None` for all of it.
     pub path: Option<String>,
-    /// What is wrong there.
+    /// The problem at that path.
     pub problem: String,
 }
 
@@ -32,21 +32,21 @@ impl JsonError {
 /// A message of the contract as JSON: names in camelCase, without fields that have their default.
 ///
 /// # Errors
-/// The message is of another contract, or has a time or duration that JSON does not write.
+/// The message is of another contract, or has a time or duration that JSON cannot represent.
 pub fn to_json<M: Message + Name>(message: &M) -> Result<Value, JsonError> {
     let mut dynamic = DynamicMessage::new(descriptor::<M>()?);
     dynamic
         .transcode_from(message)
         .map_err(|error| JsonError::whole(&error))?;
-    // By way of text, which has no more digits than tell numbers of single precision apart.
+    // Through text, which has the fewest digits that identify numbers of single precision.
     let text = serde_json::to_string(&dynamic).map_err(|error| JsonError::whole(&error))?;
     serde_json::from_str(&text).map_err(|error| JsonError::whole(&error))
 }
 
-/// The message of the contract that some JSON is. Names may be in camelCase or as in the contract; unknown ones are errors.
+/// A message of the contract from its JSON. Names may be in camelCase or as in the contract; unknown ones are errors.
 ///
 /// # Errors
-/// The first that is not as in the contract.
+/// The first mismatch with the contract.
 pub fn from_json<M: Message + Name + Default>(json: &Value) -> Result<M, JsonError> {
     let mut track = serde_path_to_error::Track::new();
     let deserializer = serde_path_to_error::Deserializer::new(json, &mut track);

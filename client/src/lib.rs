@@ -22,18 +22,18 @@
 //! ```
 //!
 //! - [`GraspClient`] connects and calls, with deadlines and retries; it is cheap to clone.
-//! - [`v1`] has the contract's messages as they are sent. Requests have builders for what is usual, such as
-//!   [`v1::FindGraspRequest::new`] and [`v1::Shape::capsule`], and answers methods for what they are mostly read for, such as
+//! - [`v1`] has the contract's messages as they are sent, with builders of common requests, such as
+//!   [`v1::FindGraspRequest::new`] and [`v1::Shape::capsule`], and methods for common uses of answers, such as
 //!   [`v1::Grasp::client_contacts`]. Vectors and rotations convert from and to glam's.
 //! - [`GraspStream`] has every better grasp as it is found, or the best that differ.
 //! - [`TrackStream`] holds on to a grasp while giver and object move, frame by frame.
-//! - [`ObjectWatch`] tells what happens to objects.
+//! - [`ObjectWatch`] reports changes of objects.
 //! - [`ClientError`] has the code of a failed call and the standard details that the server attached.
 //!
 //! All poses are in one frame of the client's choice; a field named `a_from_b` maps points of frame b to frame a. Metres,
 //! kilograms, newtons, radians and unit quaternions, in the axes of the request's [`Convention`].
 //!
-//! The folder `examples` has complete programs: one search, an own object with a tracked hand, and a moving giver drawn as an
+//! The folder `examples` has complete programs: one search, a custom object with a tracked hand, and a moving giver drawn as an
 //! animation. Feature `built-in` adds the built-in holdouts as requests, `json` protobuf's JSON of messages.
 
 #[cfg(feature = "built-in")]

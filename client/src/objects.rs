@@ -16,14 +16,13 @@ use crate::{
     streams::{MessageStream, ObjectWatch},
 };
 
-/// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
-/// pieces.
+/// Largest mesh in bytes that is sent in one message, the default limit of servers; larger ones are uploaded in pieces.
 const MAX_MESSAGE: usize = 8 << 20;
 
 /// Bytes of a mesh in one part of an upload; the server takes up to 1 MiB.
 const PIECE_BYTES: usize = 256 << 10;
 
-/// Bytes of a mesh per second that an upload is given in addition to the call timeout.
+/// Slowest upload in bytes per second; extends the call timeout.
 const SLOWEST_UPLOAD: usize = 1 << 20;
 
 /// An object's mesh as searches use it.
@@ -32,12 +31,12 @@ pub struct ObjectMesh {
     /// A GLB file in the object's frame, in metres and +Y up. Triangles that may be touched have the material `surface`, the
     /// others `forbidden`.
     pub glb: Vec<u8>,
-    /// The state of the object that it belongs to.
+    /// The etag of the object with this mesh.
     pub etag: String,
 }
 
 impl GraspClient {
-    /// All objects from the page on that the request names, from as many pages as needed.
+    /// All objects from the request's page on, over as many pages as needed.
     ///
     /// # Errors
     /// Any except those of connecting.
@@ -86,8 +85,8 @@ impl GraspClient {
     }
 
     /// Creates an object. A mesh of more than 8 MiB is sent in pieces. The call is retried like any other: the server
-    /// recognises a retry by its request id, which is drawn if the request has none, and answers with the object that the lost
-    /// answer was about. Takes at most the call timeout and, in pieces, a second per MiB.
+    /// recognises a retry by its request id, which is drawn if the request has none, and answers with the object of the lost
+    /// answer. Takes at most the call timeout and, in pieces, a second per MiB.
     ///
     /// # Errors
     /// Any except those of connecting; the violations of `InvalidArgument` list everything wrong with the object,
@@ -131,7 +130,7 @@ impl GraspClient {
     /// # Errors
     /// Any except those of connecting; `Aborted` if the object has another etag,
     /// `FailedPrecondition` if the server started with it. After a retry, `NotFound` may mean
-    /// that the lost answer was about its deletion.
+    /// that the lost answer confirmed the deletion.
     pub async fn delete_object(
         &self,
         name: impl Into<String>,
@@ -148,7 +147,7 @@ impl GraspClient {
         .await
     }
 
-    /// Creates an object that is described without its mesh, which is sent in pieces.
+    /// Creates an object whose mesh is sent in pieces.
     async fn upload_object(
         &self,
         described: v1::CreateObjectRequest,
@@ -196,7 +195,7 @@ impl GraspClient {
                 None => return Ok(mesh),
                 Some(part) => {
                     mesh.glb.extend(part.piece);
-                    // The first part has it, and the others none.
+                    // Only the first part has an etag.
                     mesh.etag += &part.etag;
                 }
             }
@@ -204,7 +203,7 @@ impl GraspClient {
     }
 
     /// Watches the objects that match a filter, as [`filter`](v1::ListObjectsRequest::filter) of lists; all if it is empty. With
-    /// `include_present`, news of the present objects come first. The call timeout applies to the server's first answer only.
+    /// `include_present`, the present objects come first. The call timeout applies to the server's first answer only.
     ///
     /// # Errors
     /// Any except those of connecting.
@@ -283,7 +282,7 @@ impl GraspClient {
     }
 }
 
-/// The token of the page after the one of `token`; `None` after the last one.
+/// The token of the page after that of `token`; `None` after the last page.
 fn next_token(token: &str, next: String) -> Result<Option<String>, ClientError> {
     if !next.is_empty() && next == token {
         // Following it would never end.

@@ -17,7 +17,7 @@ const PUSHBACK_TRAILER: &str = "grpc-retry-pushback-ms";
 /// together.
 const JITTER: f64 = 0.2;
 
-/// How often a call is retried, and after which waits.
+/// Number of attempts of a call, and the waits between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RetryPolicy {
     /// Largest number of attempts, the first included; 1 disables retries.
@@ -39,7 +39,7 @@ impl RetryPolicy {
         multiplier: 1.0,
     };
 
-    /// The wait after `attempts` attempts, the last of which ended with `status`; `None` to give up.
+    /// The wait after attempt number `attempts`, which ended with `status`; `None` to give up.
     pub(crate) fn wait_after(&self, attempts: u32, status: &Status) -> Option<Duration> {
         if status.code() != Code::Unavailable || attempts >= self.max_attempts {
             return None;

@@ -1,4 +1,4 @@
-//! The client's streams of grasps: better ones as they are found, the best that differ, and those of a giver who moves.
+//! The client's streams: grasps of a search, tracks of a moving giver, and changes of objects.
 
 use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, track_holdout_request::Message};
 use tokio::sync::watch;
@@ -14,7 +14,7 @@ pub struct MessageStream<M>(pub(crate) Streaming<M>);
 /// The grasps of a search, as they are found: after the last one comes the outcome, without a grasp.
 pub type GraspStream = MessageStream<v1::FindGraspResponse>;
 
-/// News of objects, as they happen.
+/// Changes of objects, as they happen.
 pub type ObjectWatch = MessageStream<v1::WatchObjectsResponse>;
 
 impl<M> MessageStream<M> {
@@ -22,15 +22,15 @@ impl<M> MessageStream<M> {
     ///
     /// # Errors
     /// Any except those of connecting; with the code `Unavailable` when the server shuts down, and `DeadlineExceeded` of grasps or
-    /// `ResourceExhausted` of news if this client reads too slowly. Watch again then, with the present objects.
+    /// `ResourceExhausted` of changes if this client reads too slowly. Watch again then, with the present objects.
     pub async fn next(&mut self) -> Result<Option<M>, ClientError> {
         let message = self.0.message().await;
         message.map_err(|status| ClientError::from_status(&status, 1))
     }
 }
 
-/// A track of a moving giver. Frames never wait, neither here nor at the server: the latest wins. Nor do many answers: who reads none
-/// for a while meets at most six old ones, as frames say how many were read. Dropping it ends the track.
+/// A track of a moving giver. Frames never queue, neither here nor at the server: the latest wins. At most six answers queue for a
+/// slow reader, as frames acknowledge the answers read. Dropping it ends the track.
 #[derive(Debug)]
 pub struct TrackStream {
     latest: watch::Sender<Option<v1::TrackFrame>>,
@@ -39,7 +39,7 @@ pub struct TrackStream {
 }
 
 impl TrackStream {
-    /// Sends a frame, in place of one that has not left yet. Does not wait. Its `answers_read` is set here.
+    /// Sends a frame, in place of one that has not left yet. Does not wait. Sets its `answers_read`.
     pub fn send(&self, frame: &v1::TrackFrame) {
         self.latest.send_replace(Some(v1::TrackFrame {
             answers_read: Some(self.answers_read),

@@ -33,7 +33,7 @@ search; the output folder receives a picture (PNG) and a scene (GLB) per holdout
 With --json: {"folder", "overview", "found", "grasps": [{"object", "holdout", "picture", "scene", "answer",
 "round_trip_seconds"}]}, with answers as `grasp find --json` writes them."#;
 
-/// Time limit for the server to load the built-in atlases, usually done in some tenths of a second. Without them, searches
+/// Time limit for the server to load the built-in atlases, usually a few tenths of a second. Without them, searches
 /// start from scratch.
 const ATLAS_LOAD_TIME: Duration = Duration::from_secs(10);
 
@@ -154,7 +154,7 @@ impl Arguments {
         step: impl Fn(String),
     ) -> Result<Vec<AnsweredHoldout>, Failure> {
         let client = GraspClient::connect(url).await?;
-        // The first call of a connection exchanges settings; keep that out of the measured times.
+        // The first call of a connection exchanges settings, which measured times should exclude.
         client.health().await?;
         if self.strategy == Strategy::Guided {
             wait_for_atlases(&client).await?;
@@ -194,13 +194,13 @@ impl AnsweredHoldout {
         self.answer.outcome() == Outcome::Found
     }
 
-    /// The line below its picture in the overview.
+    /// Caption in the overview.
     fn caption(&self) -> String {
         let missing = if self.is_found() { "" } else { ": no grasp" };
         format!("{}{missing}", self.holdout.name)
     }
 
-    /// Writes the picture and the scene; the picture for the overview.
+    /// Writes the picture and the scene; returns the picture for the overview.
     async fn draw(&self, arguments: &Arguments) -> Result<Image, Failure> {
         let object = &self.holdout.object;
         let handover = Handover {
@@ -247,7 +247,7 @@ fn describe(all: &[AnsweredHoldout]) -> String {
             Outcome::Aborted => "aborted",
             _ => "none in time",
         };
-        // Without the object, which has its own column.
+        // The object has its own column.
         let name = holdout.name.trim_start_matches(&holdout.object);
         let rejections = answer.report.as_ref().map(rejections_at_a_glance);
         let (grasp_type, comfort) = answer.grasp().map_or_else(
@@ -272,8 +272,7 @@ fn describe(all: &[AnsweredHoldout]) -> String {
     table.to_string()
 }
 
-/// Waits until the grips that ship with the server are read, a moment after its start: then the same seed always shows
-/// the same grasps.
+/// Waits until the server has loaded its built-in atlases: from then on, the same seed shows the same grasps.
 async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
     let start = Instant::now();
     for object in client.list_objects(&v1::ListObjectsRequest::default()).await? {

@@ -36,7 +36,7 @@ pub(crate) struct Arguments {
     /// A JSON file with a request, as for find; - for standard input. Its giver comes first.
     #[arg(long, value_name = "FILE")]
     request: Option<PathBuf>,
-    /// Time limit, of all givers together. Default: the server's.
+    /// Time limit for all givers together. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
     #[command(flatten)]
@@ -48,7 +48,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let client = arguments.server.connect().await?;
     let answer = client.evaluate_holdout(&request).await?;
     output.write_message(&answer, |answer| describe(&names, answer))?;
-    // Nothing keeps hands from the object, not even something that only a newer server names.
+    // Also false for obstructions that only a newer server names.
     let can_be_taken = answer.ratings.iter().any(|rating| rating.no_grasp == 0);
     Ok(Ending::found(can_be_taken))
 }

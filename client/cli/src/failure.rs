@@ -76,13 +76,13 @@ impl Failure {
 
     /// Writing to standard output failed.
     pub(crate) fn output(error: &io::Error) -> Self {
-        // A reader that closed the pipe has seen enough.
+        // Readers such as `head` close the pipe early.
         let is_closed = error.kind() == io::ErrorKind::BrokenPipe;
         let message = format!("cannot write to standard output: {error}");
         Self::new(u8::from(!is_closed), "output", message)
     }
 
-    /// Anything else that could not be done, and why.
+    /// Any other failure, with its cause.
     pub(crate) fn other(what: impl Into<String>, why: impl Into<BoxError>) -> Self {
         let message = format!("{}: {}", what.into(), with_causes(why.into().as_ref()));
         Self::new(1, "other", message)
@@ -171,7 +171,7 @@ pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
     let wants_json = std::env::args_os().any(|argument| argument == "--json");
     if error.use_stderr() && wants_json {
         let message = error.to_string();
-        // The first paragraph says what is wrong; usage and hints follow.
+        // The first paragraph is the error; usage and hints follow.
         let what = message.split("\n\n").next().unwrap_or_default();
         let what = what.strip_prefix("error: ").unwrap_or(what).trim_end();
         return Failure::usage(what).report(true);
@@ -181,7 +181,7 @@ pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
-/// An error and its causes, separated by colons; causes that repeat the error before are left out.
+/// An error and its causes, separated by colons; causes that repeat the preceding error are left out.
 fn with_causes(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

@@ -1,4 +1,4 @@
-//! What users give: options, files and standard input.
+//! Input: options, files and standard input.
 
 use std::{
     io::Read as _,
@@ -29,7 +29,7 @@ use crate::{
     output::{joined, list},
 };
 
-/// Bounds on meshes that are read here: the largest that a server can be configured to take.
+/// Limits of meshes: the largest that a server can be configured to accept.
 pub(crate) const MESH_LIMITS: MeshLimits = MeshLimits {
     bytes: 1 << 30,
     vertices: 10_000_000,
@@ -42,17 +42,17 @@ pub(crate) fn read_message<M: Message + Name + Default>(what: &str, path: &Path)
         .map_err(|error| Failure::usage(format!("{what} {}: {error}", path.display())))
 }
 
-/// Reads messages of a kind as a list of protobuf's JSON.
+/// Reads a list of messages in protobuf's JSON.
 pub(crate) fn read_messages<M: Message + Name + Default>(what: &str, path: &Path) -> Result<Vec<M>, Failure> {
     let values: Vec<Value> = read_json(what, path)?;
     messages_of(&values)
         .map_err(|(place, error)| Failure::usage(format!("{what} {}: [{place}]: {error}", path.display())))
 }
 
-/// Messages of their protobuf's JSON.
+/// Parses messages in protobuf's JSON.
 ///
 /// # Errors
-/// The place of the first that is wrong.
+/// The index of the first invalid value, and the error.
 pub(crate) fn messages_of<M: Message + Name + Default>(
     values: &[Value],
 ) -> Result<Vec<M>, (usize, JsonError)> {
@@ -108,7 +108,7 @@ pub(crate) fn id_from_file(path: &Path) -> String {
     joined("-", words.filter(|word| !word.is_empty()))
 }
 
-/// Which server to call, and its time limits.
+/// The server to call, and time limits.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Server")]
 pub(crate) struct ServerOptions {
@@ -198,7 +198,7 @@ pub(crate) fn parse_label(text: &str) -> Result<(String, String), String> {
     Ok((key.to_owned(), value.to_owned()))
 }
 
-/// The full name in a collection, such as "objects/remote", for which "remote" is short.
+/// The full name in a collection: "objects/remote" for "remote" or itself.
 pub(crate) fn full_name(collection: &str, name: &str) -> String {
     match name.split_once('/') {
         Some((given, _)) if given == collection => name.to_owned(),
@@ -218,7 +218,7 @@ pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
     Ok(ViewSize { width, height })
 }
 
-/// A value that is given by name: the name, the value, and what help pages say about it.
+/// A named value of an option: the name, the value, and its help text.
 pub(crate) type Choice<T> = (&'static str, T, &'static str);
 
 pub(crate) fn one_of<T, const COUNT: usize>(values: [Choice<T>; COUNT]) -> impl TypedValueParser<Value = T>
@@ -260,7 +260,7 @@ mod tests {
 
     use super::*;
 
-    /// A parser accepts these texts, and rejects those that bars separate.
+    /// Checks that a parser accepts these texts and rejects those that bars separate.
     fn check<T: PartialEq + Debug>(
         parse: impl Fn(&str) -> Result<T, String>,
         accepted: impl IntoIterator<Item = (&'static str, T)>,

@@ -1,4 +1,4 @@
-//! The command line `grasp`: one module per command, and what the commands share.
+//! The command line `grasp`: one module per command, and shared code.
 
 mod bake;
 mod demo;
@@ -28,7 +28,7 @@ const HEALTH: &str = r#"Check whether the server accepts requests; the exit code
 
 With --json: {"health": "serving" | "not_serving" | "unknown"}."#;
 
-/// Part of the interface for scripts; shown at the end of help pages.
+/// Exit codes at the end of help pages; scripts rely on them.
 const EXIT_CODES: &str = "\
 Exit codes:
     0  done; for find: a grasp was found; for validate: the grasp is valid; for evaluate: the object can be taken; for health: serving
@@ -79,9 +79,9 @@ enum Command {
 enum Ending {
     /// The command did its work.
     Done = 0,
-    /// No grasp was found within the budget, or the one to check is not valid.
+    /// No grasp was found within the budget, or the grasp to check is not valid.
     NoGrasp = 3,
-    /// The server rejected some of several things.
+    /// The server rejected some of several objects.
     Rejected = 4,
     /// The server is up but not serving.
     NotServing = 5,

@@ -96,7 +96,7 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
 }
 
-/// A table with a header of names with " | " in between; a leading `>` aligns a column to the right.
+/// A table whose header is names separated by " | "; a leading `>` aligns a column to the right.
 pub(crate) fn table(header: &str) -> Table {
     let header: Vec<&str> = header.split(" | ").collect();
     let mut table = Table::new();
@@ -137,7 +137,7 @@ pub(crate) fn bar(steps: u64, counts: &str) -> ProgressBar {
     bar
 }
 
-/// The name of a value of one of the contract's enumerations, in words.
+/// The name, in words, of a value of an enumeration of the contract.
 pub(crate) fn name_of(value: impl Copy + Debug) -> String {
     let mut words = String::new();
     for letter in format!("{value:?}").chars() {
@@ -149,12 +149,12 @@ pub(crate) fn name_of(value: impl Copy + Debug) -> String {
     words
 }
 
-/// Texts with commas in between.
+/// Texts separated by commas.
 pub(crate) fn list<T: ToString>(texts: impl IntoIterator<Item = T>) -> String {
     joined(", ", texts)
 }
 
-/// Texts with a separator in between.
+/// Texts separated by `separator`.
 pub(crate) fn joined<T: ToString>(separator: &str, texts: impl IntoIterator<Item = T>) -> String {
     let texts: Vec<String> = texts.into_iter().map(|text| text.to_string()).collect();
     texts.join(separator)
@@ -171,7 +171,7 @@ pub(crate) fn grasp_type_name(grasp: &v1::Grasp) -> String {
     }
 }
 
-/// Metres of a length of 1 in a convention.
+/// Metres per unit of length of a convention.
 pub(crate) fn metres(convention: Convention) -> f32 {
     match convention {
         Convention::Unreal | Convention::UnrealXzy => 0.01,

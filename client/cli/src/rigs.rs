@@ -60,14 +60,14 @@ struct CreateArguments {
     /// The model of the other hand, if each hand has a file.
     #[arg(long, value_name = "FILE")]
     other_model: Option<PathBuf>,
-    /// What measured widths are multiplied by: 0.5 to 2.
+    /// Factor on measured widths: 0.5 to 2.
     #[arg(long, value_name = "FACTOR")]
     width_scale: Option<f32>,
     /// A joint's distance from the skin in metres, such as index-finger-tip=0.008, instead of the measured one; may be repeated.
     #[arg(long, value_name = "JOINT=METRES", value_parser = parse_radius)]
     radius: Vec<(String, f32)>,
-    /// A node and the joint that it is, such as Bone.012=index-finger-phalanx-proximal, for names that are not known; may be
-    /// repeated. Joints have the names of the web's hand input module.
+    /// A node with an unrecognised name and its joint, such as Bone.012=index-finger-phalanx-proximal; may be repeated. Joints
+    /// have the names of the web's hand input module.
     #[arg(long, value_name = "NODE=JOINT", value_parser = parse_joint)]
     joint: Vec<(String, String)>,
 }
@@ -114,7 +114,7 @@ async fn create(arguments: CreateArguments, server: &ServerOptions, output: Outp
     output.write_message(&rig, describe)
 }
 
-/// The node and the joint of NODE=JOINT; names of nodes may contain the sign.
+/// The node and the joint of NODE=JOINT; a node's name may contain "=".
 fn parse_joint(text: &str) -> Result<(String, String), String> {
     let parts = text.rsplit_once('=');
     let parts = parts.filter(|(node, joint)| !node.is_empty() && !joint.is_empty());
@@ -149,14 +149,14 @@ fn listed(rigs: &[v1::HandRig]) -> String {
     table.to_string()
 }
 
-/// How many digits the hands have: one number if it is the same.
+/// Number of digits of each hand; a single number if all are equal.
 fn digits(hands: &[v1::RigHand]) -> String {
     let mut counts: Vec<String> = hands.iter().map(|hand| hand.limits.len().to_string()).collect();
     counts.dedup();
     counts.join(" and ")
 }
 
-/// From the wrist to the tip of the longest finger, stretched, in millimetres.
+/// Length from the wrist to the tip of the longest stretched finger, in millimetres.
 fn length(hand: &v1::RigHand) -> String {
     const TIPS: [usize; 4] = [10, 15, 20, 25];
     // Joints are in the wrist's frame; those of missing fingers are empty.
@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_joint_follows_the_last_sign() {
+    fn a_joint_follows_the_last_equals_sign() {
         let pair = |node: &str, joint: &str| Ok((node.to_owned(), joint.to_owned()));
         assert_eq!(parse_joint("Bone.1=wrist"), pair("Bone.1", "wrist"));
         assert_eq!(parse_joint("a=b=wrist"), pair("a=b", "wrist"));

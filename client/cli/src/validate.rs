@@ -27,7 +27,7 @@ what `grasp find --json` wrote, one of the grasps in it, or the API's HandPose a
 
 With --json the answer is the API's ValidateGraspResponse in protobuf's JSON."#;
 
-/// How long a search for a grasp near it takes, unless an option or the request says otherwise.
+/// Default time limit of the search for a grasp near an invalid one.
 const NEAREST_BUDGET: Duration = Duration::from_secs(1);
 
 /// Check a grasp against everything that a found one passes.
@@ -65,7 +65,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     Ok(Ending::found(answer.valid))
 }
 
-/// The grasp of a file: one to validate, an answer, or the grasp of one.
+/// The grasp of a file: a grasp to validate, an answer, or a grasp of an answer.
 fn grasp(given: &Value) -> Result<Grasp, Failure> {
     let wrong = |error: JsonError| Failure::usage(format!("grasp: {error}"));
     if given.get("hand").is_some() {
@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reads_a_hand_and_rejects_what_is_no_grasp() {
+    fn reads_a_hand_and_rejects_other_json() {
         let hand =
             json!({"rig": "rigs/adult", "handedness": "HANDEDNESS_LEFT", "little": {"basePitch": 0.25}});
         for form in [

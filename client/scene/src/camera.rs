@@ -8,13 +8,13 @@ use rayon::prelude::*;
 
 use crate::{parts::Part, render::Stage};
 
-/// Vertical opening angle in radians (26°): a portrait lens. Wider exaggerates what is near, narrower flattens.
+/// Vertical field of view in radians (26°), as of a portrait lens: wider ones exaggerate near parts, narrower ones flatten.
 const VERTICAL_FOV: f32 = 0.45;
 
 /// Share of the picture's half width and height that is left free on each side.
 const MARGIN: f32 = 0.06;
 
-/// Least distance of the camera from what it frames, in metres.
+/// Least distance of the camera from the points that it frames, in metres.
 const MIN_DISTANCE: f32 = 0.01;
 
 /// Candidate directions: their number around the vertical …
@@ -30,7 +30,7 @@ const TRIAL_WIDTH: usize = 112;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Camera {
     pub(crate) world_from_camera: Pose,
-    /// Tangents of half the horizontal and half the vertical opening angle.
+    /// Tangents of half the horizontal and half the vertical field of view.
     pub(crate) tangents: Vec2,
 }
 
@@ -89,8 +89,8 @@ fn looking_against(direction: Vec3, up: Vec3) -> Quat {
     Quat::from_mat3(&Mat3::from_cols(x, z.cross(x), z))
 }
 
-/// The best camera that frames all parts that are to be seen. `importance` weights parts, and is negative for those that are better
-/// not seen; a part counts by its visible area relative to the largest that any candidate shows.
+/// The best camera that frames all parts of positive `importance`. Each part counts with that weight, negative if it is better
+/// hidden, by its visible area relative to the largest of any candidate.
 pub(crate) fn best_view(
     parts: &[Part],
     stage: &Stage,
@@ -114,8 +114,8 @@ pub(crate) fn best_view(
         }
     }
 
-    // Candidates fill their pictures: pixels are converted to area in the scene. Otherwise the short end of a long object,
-    // seen from close up, would count as much as its side.
+    // Area in the scene, not in pixels: otherwise the short end of a long object, seen from close up, would count as much as
+    // its side.
     let areas: Vec<Vec<f32>> = candidates
         .par_iter()
         .map(|(camera, _)| {

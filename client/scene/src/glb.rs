@@ -43,11 +43,11 @@ pub(crate) struct MovingHand {
     pub(crate) name: String,
     pub(crate) person: Person,
     pub(crate) skin: &'static Skin,
-    /// The joints at each moment, in the client's frame; `None` when the hand is not there.
+    /// The joints at each moment, in the client's frame; `None` while the hand is absent.
     pub(crate) joints: Vec<Option<HandJoints>>,
 }
 
-/// A handover that moves, in the client's frame: metres, right-handed.
+/// A moving handover, in the client's frame: metres, right-handed.
 #[derive(Clone, Debug)]
 pub(crate) struct MovingHandover {
     /// The object, in its own frame.
@@ -62,8 +62,8 @@ pub(crate) struct MovingHandover {
 /// A moving handover as a GLB file with an animation `handover`: a key frame per moment.
 ///
 /// The object is a node that moves. Each hand is a node of its name with 26 joints below it, named after the hand and the
-/// joint in `WebXR` (`giver_wrist`), which move its skinned mesh, such as `giver_hand`; the sleeve is below the wrist. A hand
-/// that is not there has no size.
+/// joint in `WebXR` (`giver_wrist`), which move its skinned mesh, such as `giver_hand`; the sleeve is below the wrist. An
+/// absent hand has scale 0.
 ///
 /// # Panics
 /// There is not one pose of the object and of each hand per moment.
@@ -88,7 +88,7 @@ pub(crate) fn to_moving_glb(handover: &MovingHandover) -> Vec<u8> {
 #[derive(Default)]
 struct Writer {
     nodes: Vec<Value>,
-    /// The nodes that have no parent.
+    /// The nodes without parents.
     roots: Vec<usize>,
     meshes: Vec<Value>,
     materials: Vec<Value>,
@@ -245,7 +245,7 @@ impl Writer {
     fn add_poses(&mut self, node: usize, poses: &[Pose]) {
         let positions: Vec<[f32; 3]> = poses.iter().map(|pose| pose.position.to_array()).collect();
         let mut orientations: Vec<Quat> = poses.iter().map(|pose| pose.orientation.normalize()).collect();
-        // Of a quaternion and its opposite, the one near that before: some viewers do not take the short way.
+        // Of a quaternion and its opposite, takes the one nearer to the previous: some viewers do not take the short way.
         for i in 1..orientations.len() {
             if orientations[i].dot(orientations[i - 1]) < 0.0 {
                 orientations[i] = -orientations[i];
@@ -319,7 +319,7 @@ impl Writer {
             length: 0,
         };
         let file = Glb {
-            // Its length is computed when it is written.
+            // The writer computes its length.
             header,
             json: document.to_string().into_bytes().into(),
             bin: (!self.buffer.is_empty()).then(|| self.buffer.into()),
@@ -328,7 +328,7 @@ impl Writer {
     }
 }
 
-/// The joints at every moment: those before or else after, where the hand is not there. `None` if it never is.
+/// The joints at every moment: the preceding or else the next ones while the hand is absent. `None` if it is always absent.
 fn filled(joints: &[Option<HandJoints>]) -> Option<Vec<&HandJoints>> {
     let mut last = joints.iter().flatten().next()?;
     let at_every_moment = joints.iter().map(|joints| {
@@ -338,7 +338,7 @@ fn filled(joints: &[Option<HandJoints>]) -> Option<Vec<&HandJoints>> {
     Some(at_every_moment.collect())
 }
 
-/// Joints without weight are to be 0 (3.7.3.3 of the specification).
+/// Sets joints without weight to 0 (3.7.3.3 of the specification).
 fn without_idle_joints(joints: [u8; 4], weights: &[f32; 4]) -> [u8; 4] {
     std::array::from_fn(|i| if weights[i] == 0.0 { 0 } else { joints[i] })
 }
@@ -372,9 +372,9 @@ fn material(part: &Part) -> Value {
     material
 }
 
-/// A part's vertices, split where the triangles around one have different normals.
+/// A part's vertices, split where adjacent triangles have different normals.
 struct Vertices {
-    /// The part's vertex that each one is.
+    /// The part's vertex behind each one.
     sources: Vec<u32>,
     normals: Vec<Vec3>,
     indices: Vec<u32>,

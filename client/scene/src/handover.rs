@@ -50,7 +50,7 @@ impl std::error::Error for CannotDraw {}
 pub struct Handover {
     /// The object, in its own frame.
     pub object: Part,
-    /// Where the object and the giver's hand are.
+    /// The poses of the object and of the giver's hand.
     pub holdout: v1::Holdout,
     /// The grasp of one hand of the receiver, or of both.
     pub grasps: Vec<v1::Grasp>,
@@ -166,15 +166,15 @@ fn contact_parts(contacts: &[v1::Contact]) -> Vec<Part> {
     parts
 }
 
-/// Weight of a part's visibility in the choice of a view: the object, often hidden by hands, and all contacts together
-/// count more than the hands, which are always visible in part.
+/// Weight of a part's visibility in the choice of a view: the object and all contacts together, often hidden by hands, count
+/// more than the hands, which are always visible in part.
 fn importance(part: &Part, contacts: usize) -> f32 {
     match part.name.as_str() {
         "object" => 2.0,
         "receiver_hand" | "other_receiver_hand" => 1.0,
         "giver_hand" => 0.6,
         name if name.starts_with("contact_") => 2.0 / contacts.max(1) as f32,
-        // It would fill a picture that it is nearest in.
+        // A camera near it would see little else.
         "receiver_upper_arm" => -1.0,
         _ => 0.0,
     }

@@ -112,7 +112,7 @@ fn dots(text: &str) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// The rows of a character from its top, of [`GLYPH_WIDTH`] bits each, in the lowest bits; the leftmost dot of a row and the first row are
-/// the highest. "?" stands for characters without a glyph.
+/// the highest. "?" replaces characters without a glyph.
 fn glyph(character: char) -> u64 {
     let is_known = (' '..='~').contains(&character);
     GLYPHS[if is_known { character } else { '?' } as usize - ' ' as usize]
@@ -169,7 +169,7 @@ mod tests {
         let below = (0..44).flat_map(|x| (30..30 + CAPTION_HEIGHT).map(move |y| (x, y)));
         let ink = below.filter(|(x, y)| pixel(&sheet, left + x, top + y) == [INK; 3]);
         assert_eq!(ink.count(), GLYPH_HEIGHT * CAPTION_SCALE * CAPTION_SCALE);
-        // As another program reads it.
+        // Decoded independently.
         let mut reader = png::Decoder::new(std::io::Cursor::new(sheet.to_png()))
             .read_info()
             .unwrap();

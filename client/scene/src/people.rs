@@ -12,7 +12,7 @@ use crate::{
     parts::{Finish, Part, capsule, lathe, linear_from_srgb, smoothstep},
 };
 
-/// Length of a sleeve of an arm that is not known, in metres; long enough to leave the picture.
+/// Length of the sleeve of an unknown arm, in metres; long enough to leave the picture.
 const LENGTH: f32 = 0.17;
 
 /// Distance of the cuff's edge from the wrist joint, away from the hand, in metres.
@@ -25,8 +25,7 @@ const CLEARANCE: f32 = 0.003;
 const CUFF_WIDTH: f32 = 0.020;
 const CUFF_THICKNESS: f32 = 0.0022;
 
-/// Widths of the sleeve relative to that at the cuff: at the end of one of an arm that is not known, at the elbow and at the
-/// shoulder.
+/// Widths of the sleeve relative to the cuff's: at the end of an unknown arm's sleeve, at the elbow and at the shoulder.
 const WIDENING: f32 = 1.28;
 const ELBOW_WIDENING: f32 = 1.4;
 const SHOULDER_WIDENING: f32 = 1.7;

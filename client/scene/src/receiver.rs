@@ -1,8 +1,8 @@
-//! How a character's hand moves to the grasps that it is answered: the client's part of a handover.
+//! The motion of a character's hand to the answered grasps: the client's part of a handover.
 //!
-//! The open hand waits where it was drawn back to. With a grasp it goes there by way points (drawn back, open at the object,
-//! closed), at a bounded speed. Near the object it moves along with it, so that it holds still in the object's frame. A near grasp
-//! is blended into; one whose straight way is not free is reached over the way points of both.
+//! The open hand waits, drawn back. It reaches a grasp by way points (drawn back, open at the object, closed), at a bounded speed.
+//! Near the object, it follows its motion. A changed grasp that is near is approached directly; one whose straight path is not
+//! free is reached over the way points of both.
 
 use std::collections::VecDeque;
 
@@ -31,14 +31,14 @@ const TOP_SPEED: f32 = 1.1;
 const SLOWING: f32 = 9.0;
 const LAST_SPEED: f32 = 0.03;
 
-/// Metres that a radian counts as, of the wrist's orientation and of a joint of the fingers.
+/// Metres per radian in distances, of the wrist's orientation and of a finger's joint.
 const METRES_PER_TURN: f32 = 0.25;
 const METRES_PER_BEND: f32 = 0.22;
 
-/// Way points are left for the next one at this distance, in metres: corners are rounded.
+/// The hand turns to the next way point at this distance, in metres: corners are rounded.
 const CORNER: f32 = 0.03;
 
-/// The hand moves along with an object that is nearer than the first, and not at all with one farther than the second, in metres.
+/// Distances in metres: the hand fully follows an object nearer than the first, and not at all one farther than the second.
 const CARRIED: (f32, f32) = (0.15, 0.45);
 
 /// How far the open hand is drawn back without key frames, and how much nearer to its shoulder it waits, in metres.
@@ -103,13 +103,13 @@ impl Receiver {
         })
     }
 
-    /// Goes for a grasp, which replaces the one before. `straight`: the straight way from there is free.
+    /// Reaches for a grasp, which replaces the previous one. `straight`: the straight path from there is free.
     pub(crate) fn take(&mut self, grasp: &v1::Grasp, straight: bool) {
         let new @ [.., closed] = way_in(grasp, &self.rig);
         let to_pass = self.way.len();
         match self.hold.replace(new) {
             Some([.., old]) if old.distance(&closed) < SAME => {}
-            // On the way in. What has been passed need not be passed again.
+            // On the way in: skips the way points already passed.
             Some(_) if to_pass > 1 => {
                 self.way.truncate(to_pass.saturating_sub(new.len()));
                 self.way.extend(&new[new.len().saturating_sub(to_pass)..]);
@@ -135,7 +135,7 @@ impl Receiver {
         }
     }
 
-    /// Moves on, in `seconds` in which the object has got to `client_from_object`.
+    /// Moves on by `seconds`, in which the object has moved to `client_from_object`.
     pub(crate) fn advance(&mut self, seconds: f32, client_from_object: Pose) {
         self.follow(client_from_object);
         loop {
@@ -167,7 +167,7 @@ impl Receiver {
         posed(&self.rig, self.posture.wrist, self.posture.digits)
     }
 
-    /// Takes part in the motion of an object that the hand is near.
+    /// Follows the motion of a near object.
     fn follow(&mut self, client_from_object: Pose) {
         if let Some(next) = self.way.front() {
             let there = self.client_from_object.transform_point(next.wrist.position);
@@ -211,7 +211,7 @@ fn away_from_contacts(grasp: &v1::Grasp, object_from_wrist: Pose) -> Vec3 {
 }
 
 impl Posture {
-    /// That of a hand in the object's frame.
+    /// The posture of a hand in the object's frame.
     fn at_object(hand: Option<&v1::HandPose>) -> Self {
         Self {
             wrist: synthesis_pose(hand.and_then(|hand| hand.object_from_wrist)),
@@ -227,7 +227,7 @@ impl Posture {
         }
     }
 
-    /// How far the hand has to go, in metres: the way of the wrist, or turns and bends that take as long.
+    /// Distance in metres: the largest of the wrist's path and of turns and bends, converted to metres.
     fn distance(&self, other: &Self) -> f32 {
         let way = self.wrist.position.distance(other.wrist.position);
         let turn = angle_between(self.wrist.orientation, other.wrist.orientation);
@@ -252,13 +252,13 @@ impl Posture {
     }
 }
 
-/// The angle of the rotation from one orientation to another, exact for small ones; that of a quaternion and its opposite is 0.
+/// The angle of the rotation between two orientations, exact for small angles; 0 for a quaternion and its opposite.
 fn angle_between(a: Quat, b: Quat) -> f32 {
     let chord = (a - b).length().min((a + b).length());
     4.0 * (0.5 * chord).min(1.0).asin()
 }
 
-/// Fingers on the way to stretched ones; the thumb turns no farther out of the palm than it is.
+/// Partly stretched fingers; the thumb turns no farther out of the palm.
 fn opened(closed: [DigitAngles; 5], rig: &Rig) -> [DigitAngles; 5] {
     let mut stretched = rig.stretched();
     for (stretched, closed) in stretched.iter_mut().zip(&closed) {

@@ -200,7 +200,7 @@ impl Seen {
     }
 }
 
-/// Surfaces that rays can meet, in a hierarchy of boxes.
+/// Triangles in a bounding volume hierarchy.
 struct Tracer {
     /// In the order of the hierarchy's leaves.
     triangles: Vec<Triangle>,
@@ -334,7 +334,7 @@ mod tests {
         height: 90,
     };
 
-    /// A camera that looks at the origin from a place.
+    /// A camera at `place` that looks at the origin.
     fn looking_from(place: Vec3) -> Camera {
         let mut camera = Camera::framing([Vec3::ZERO], place, Vec3::NEG_Z, 4.0 / 3.0);
         camera.world_from_camera.position = place;

@@ -1,4 +1,4 @@
-//! A track of a moving giver as it was played, as an animation.
+//! The animation of a played track of a moving giver.
 
 use std::collections::{BTreeMap, btree_map::Entry};
 
@@ -17,7 +17,7 @@ use crate::{
 /// Seconds between frames without capture times: as a headset sends them, 90 per second.
 const FRAME_SECONDS: f32 = 1.0 / 90.0;
 
-/// The frames of a track, and when which answer was known.
+/// The frames of a track, and the answers with the times when they were known.
 #[derive(Clone, Debug)]
 pub struct TrackRecording {
     convention: Convention,
@@ -27,7 +27,7 @@ pub struct TrackRecording {
 }
 
 impl TrackRecording {
-    /// Nothing of a track yet.
+    /// An empty recording of a track.
     pub fn new(track: &v1::Track) -> Self {
         let output = track.output.as_ref();
         Self {
@@ -48,7 +48,7 @@ impl TrackRecording {
     }
 
     /// The motion as a binary glTF file with an animation, a moment per frame: giver and object as they were sent, and a receiver
-    /// who goes for the answered grasps as soon as they are known, at the speed of a person.
+    /// who reaches for the answered grasps as soon as they are known, at the speed of a person.
     ///
     /// # Errors
     /// The convention is not that of `OpenXR`, a hand's rig is not built in, or a hand is given as a mesh.
@@ -77,7 +77,7 @@ impl TrackRecording {
             let frames = 0..self.frames.len();
             frames.map(|frame| frame as f32 * FRAME_SECONDS).collect()
         };
-        // Times of an animation rise, but frames may be of the same time.
+        // Times of an animation must rise, but frames may have equal times.
         for i in 1..times.len() {
             times[i] = times[i].max(times[i - 1].next_up());
         }
@@ -119,8 +119,8 @@ impl TrackRecording {
         Ok(hands)
     }
 
-    /// The receiver's hands: all that answers ever name. Of several, those that wait are not there: without a body they would hang
-    /// in the air next to each other.
+    /// The receiver's hands: all that answers ever name. Of several, waiting ones are absent: without a body they would hang in the
+    /// air next to each other.
     fn receivers(&self) -> Result<Vec<MovingHand>, CannotDraw> {
         let (times, poses) = (self.times(), self.object_poses());
         let Some(&first_pose) = poses.first() else {
@@ -200,13 +200,13 @@ pub(crate) fn apply(answer: &v1::TrackAnswer, receivers: &mut BTreeMap<(bool, St
     }
 }
 
-/// True if the grasp is the one before, of which the answer says only where it is now.
+/// True if the answer has only the new wrist pose of the previous grasp.
 fn is_wrist_only(grasp: &v1::Grasp) -> bool {
     let hand = grasp.hand.as_ref();
     hand.is_none_or(|hand| hand.digits().iter().all(Option::is_none))
 }
 
-/// What distinguishes a character's hands: right or left, and the rig.
+/// Key of a character's hands: right or left, and the rig.
 pub(crate) fn key(grasp: &v1::Grasp) -> (bool, String) {
     let hand = grasp.hand.as_ref();
     let is_left = hand.is_some_and(|hand| hand.handedness() == v1::Handedness::Left);

@@ -211,7 +211,7 @@ async fn large_meshes_are_sent_in_pieces() {
     assert!(pieces.collect::<Vec<_>>().concat() == mesh);
 }
 
-/// A hand of the rig `adult` whose wrist is here in the client's frame.
+/// A hand of the rig `adult` with its wrist at `x` in the client's frame.
 fn hand(x: f32) -> HandPose {
     HandPose::new("rigs/adult", Handedness::Left)
         .with_client_from_wrist(Pose::new(Vec3::X * x, Quat::IDENTITY))
@@ -241,7 +241,7 @@ fn durations_round_trip_and_malformed_ones_are_zero() {
 }
 
 #[test]
-fn tracks_leave_out_what_frames_contain_and_frames_what_is_the_tracks() {
+fn tracks_and_frames_split_a_request_without_overlap() {
     let mut request = FindGraspRequest::new("objects/remote")
         .with_client_from_object(Pose::new(Vec3::X, Quat::IDENTITY))
         .with_hand(hand(0.0))
@@ -274,7 +274,7 @@ fn tracks_leave_out_what_frames_contain_and_frames_what_is_the_tracks() {
 }
 
 #[test]
-fn a_grasp_to_hold_on_to_has_no_more_than_requests_are_read_for() {
+fn a_current_grasp_has_only_fields_that_requests_use() {
     let answered = HandPose {
         joints: vec![JointPose::default()],
         model: vec![NodePose::default()],
@@ -325,7 +325,7 @@ fn contacts_are_moved_to_the_clients_frame() {
     assert_eq!(moved.triangle, 5);
 }
 
-/// Runs an example that cargo built along with this test; its standard output.
+/// Runs an example that cargo built along with this test; returns its standard output.
 async fn run(name: &str, arguments: &[&str]) -> String {
     // The test is in `deps`, next to `examples`.
     let test = std::env::current_exe().unwrap();

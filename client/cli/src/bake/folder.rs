@@ -17,7 +17,7 @@ use crate::{
 /// Density where no name says the material: between wood and plastic, with the hollows that everyday things have.
 const OTHERWISE: f64 = 400.0;
 
-/// Thickness in metres of what encloses no volume, such as a sheet.
+/// Thickness in metres of meshes that enclose no volume, such as a sheet.
 const SHEET_THICKNESS: f64 = 0.002;
 
 /// Words in the names of parts, with densities in kg/m³: handbook values of solid materials.
@@ -41,10 +41,10 @@ const DENSITIES: [(&[&str], f64); 17] = [
     (&["silver"], 10_500.0),
 ];
 
-/// What a mass was computed from.
+/// The density behind a computed mass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Density {
-    /// The word that says the material; `None` if no name does.
+    /// The word that names the material; `None` if no part has one.
     pub material: Option<&'static str>,
     /// Density in kg/m³.
     pub kg_per_m3: f64,
@@ -53,7 +53,7 @@ pub(super) struct Density {
 /// Reads the manifests of a folder.
 ///
 /// # Errors
-/// Everything that is wrong with it.
+/// All problems of the folder.
 pub(super) fn read_folder(path: &Path) -> Result<Vec<FolderObject>, Failure> {
     let found = objects_of_folder(path).map_err(|problems| {
         let problems = joined("\n  ", problems);
@@ -78,14 +78,14 @@ pub(super) fn read_folder(path: &Path) -> Result<Vec<FolderObject>, Failure> {
 
 pub(super) struct NewObject {
     pub request: v1::CreateObjectRequest,
-    /// What its mass was computed with; `None` if a manifest has the mass.
+    /// The density that its mass was computed with; `None` if a manifest has the mass.
     pub density: Option<Density>,
 }
 
 /// The object to create.
 ///
 /// # Errors
-/// What is wrong with the mesh, in words.
+/// Why the mesh is invalid, in words.
 pub(super) fn new_object(file: FolderObject) -> Result<NewObject, String> {
     let id = id_from_file(&file.mesh);
     let mesh = std::fs::read(&file.mesh).map_err(|error| format!("cannot be read: {error}"))?;
@@ -104,7 +104,7 @@ pub(super) fn new_object(file: FolderObject) -> Result<NewObject, String> {
     })
 }
 
-/// The density that the names of a mesh's parts say; if they say several, that of the largest surface.
+/// The density of the material that a mesh's parts are named after; of several, the one with the largest surface.
 fn density(read: &ImportedMesh) -> Density {
     let mut largest = (0.0, None);
     for (name, triangles) in &read.groups {
@@ -130,7 +130,7 @@ fn mass(read: &ImportedMesh, density: &Density) -> f32 {
     (volume * density.kg_per_m3) as f32
 }
 
-/// That of the first material that a name contains as a word.
+/// The density of the first material that a name contains as a word.
 fn density_of_name(name: &str) -> Option<Density> {
     let name = name.to_lowercase();
     let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphabetic()).collect();

@@ -1,4 +1,4 @@
-//! What the server knows of an object: its registration, its growing atlases, and test givers.
+//! Registers objects, follows the growth of their atlases, and takes them from test givers.
 
 use std::time::{Duration, Instant};
 
@@ -21,13 +21,13 @@ use crate::{
     output::{joined, list, name_of, rejections_at_a_glance},
 };
 
-/// How long none of the atlases may grow before they are given up: the server then has no memory for them.
+/// Time without growth of any atlas after which they are given up: the server then has no memory for them.
 const STALLED: Duration = Duration::from_mins(2);
 
-/// Time limit of the search for a giver's hold, and of the one that shows what is in the way.
+/// Time limit of the search for a giver's hold, and of the search that shows what is in the way.
 const HOLD_BUDGET: Duration = Duration::from_secs(1);
 
-/// Creates an object unless an earlier run did. What is wrong with the object is in its row.
+/// Creates an object unless an earlier run did. Its row lists its violations.
 pub(super) async fn register(
     client: &GraspClient,
     file: FolderObject,
@@ -82,7 +82,7 @@ pub(super) async fn register(
     Ok(row)
 }
 
-/// A UUID of everything that the request says: the same object has the same in every run.
+/// A UUID from a hash of the request: the same object has the same id in every run.
 fn request_id(request: &v1::CreateObjectRequest) -> String {
     // Messages are encoded in order of their fields and of the keys of maps.
     let hash = Sha256::digest(request.encode_to_vec());
@@ -112,7 +112,7 @@ async fn describe(client: &GraspClient, row: &mut Row, object: &GraspObject) -> 
     Ok(())
 }
 
-/// Why atlases of the right and the left hand do not grow any more, as far as the server says.
+/// Why the atlases of the right and the left hand have stopped growing, if the server says.
 fn why_not_growing(atlases: &[Atlas; 2]) -> Option<String> {
     let both = ["right", "left"].into_iter().zip(atlases);
     let reasons = list(both.filter_map(|(side, atlas)| {
@@ -128,7 +128,7 @@ fn why_not_growing(atlases: &[Atlas; 2]) -> Option<String> {
     (!reasons.is_empty()).then_some(reasons)
 }
 
-/// Reads the state of an object whose atlases grow; true if they are complete, or will not be. `grew` is when an atlas of any
+/// Reads the state of an object whose atlases grow; true if they are complete, or never will be. `grew` is when an atlas of any
 /// object last grew.
 pub(super) async fn is_done(
     client: &GraspClient,
@@ -153,7 +153,7 @@ pub(super) async fn is_done(
     let Some(grips) = row.grips else { return Ok(true) };
     let is_complete = grips.iter().all(|hand| hand.complete);
     if !is_complete && grips.iter().all(|hand| hand.entries == 0) {
-        // Has the server load an object that rests, so that its atlas goes on.
+        // A search makes the server load an unloaded object, so that its atlas grows on.
         let mut request = v1::FindGraspRequest::new(&row.name).with_budget(Duration::from_millis(10));
         request.search_mut().max_attempts = Some(1);
         client.find_grasp(&request).await?;
@@ -161,8 +161,8 @@ pub(super) async fn is_done(
     Ok(is_complete)
 }
 
-/// Takes an object from so many givers, half of them left-handed, with the better hand. Givers hold it as a search without the
-/// object's atlas finds, by a seed each: always the same, and not as the atlas has it.
+/// Takes an object from so many givers, half of them left-handed, with the better hand. Each giver's hold is found by a search with
+/// its own seed and without the atlas: reproducible, and independent of the atlas.
 pub(super) async fn try_givers(
     client: &GraspClient,
     object: &str,
@@ -200,7 +200,7 @@ pub(super) async fn try_givers(
     Ok(result)
 }
 
-/// What keeps hands from an object that nobody holds; `None` if a search finds a grasp of it.
+/// Why hands cannot hold an object alone, without a giver; `None` if a search finds a grasp.
 pub(super) async fn in_the_way(client: &GraspClient, object: &str) -> Result<Option<String>, Failure> {
     let mut request = v1::FindGraspRequest::new(object)
         .with_budget(HOLD_BUDGET)

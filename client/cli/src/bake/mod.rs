@@ -21,35 +21,34 @@ use crate::{
 use folder::{Density, read_folder};
 use growth::{in_the_way, is_done, register, try_givers};
 
-/// How long to wait before the state of all objects is read again.
+/// Polling interval of the state of all objects.
 const PAUSE: Duration = Duration::from_millis(500);
 
 /// Register a folder of meshes, and wait until the server knows how both hands grasp them.
 ///
 /// Every NAME.obj, .stl, .ply, .glb or .gltf becomes objects/NAME, in lower case and with hyphens. NAME.toml gives its mass and
-/// what else a folder of objects says (see docker/README.md). Without it the file is in metres, and the mass is the volume times
-/// a density: that of the material which groups, objects, nodes or materials of the file are named after, or 400 kg/m³.
+/// other properties (see docker/README.md). Without it, the file is in metres, and the mass is the volume times the density of the
+/// material that groups, objects, nodes or materials of the file are named after, or 400 kg/m³.
 ///
-/// May be interrupted and started again: what is registered already is not registered again, and a server that saves its objects
-/// goes on with its atlases where it stopped, even after a restart.
+/// May be interrupted and started again: no object is registered twice, and a server that saves its objects continues their
+/// atlases where it stopped, even after a restart.
 ///
-/// Exit code 4 if objects were rejected, and otherwise 3 if one got no grips or could be taken from no test giver; the table says
-/// why.
+/// Exit code 4 if objects were rejected, otherwise 3 if one got no grips or was taken from no test giver; the table says why.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// The folder.
     folder: PathBuf,
-    /// Objects whose atlases grow at a time. The server must have room for them in its cache.
+    /// Number of objects whose atlases grow at the same time. The server's cache must have room for them.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..))]
     at_a_time: u16,
-    /// Test givers per object: hands that hold it as a search without its atlas finds, from which it is then taken. The table
-    /// counts givers for whom none is found in time separately.
+    /// Test givers per object: hands that hold it by a grasp found without its atlas, and from which it is then taken. The table
+    /// counts givers without a hold separately.
     #[arg(long, value_name = "N", default_value_t = 12)]
     givers: u16,
-    /// Time limit of each taking from a test giver.
+    /// Time limit of each search for a grasp from a test giver.
     #[arg(long, value_name = "DURATION", default_value = "50ms", value_parser = parse_duration)]
     budget: Duration,
-    /// Delete objects of the same names that were created from other files, and create them from these.
+    /// Delete and recreate objects of the same names that were created from other files.
     #[arg(long)]
     replace: bool,
     #[command(flatten)]
@@ -139,12 +138,12 @@ struct Row {
     triangles: Option<u32>,
     /// The atlases of the right and of the left hand; `None` on a server without atlases.
     grips: Option<[Grips; 2]>,
-    /// True if the atlases ceased to grow before they were complete.
+    /// True if the atlases stopped growing before they were complete.
     stalled: bool,
-    /// Why atlases do not grow, as far as the server says.
+    /// Why atlases do not grow, if the server says.
     growth: Option<String>,
     givers: Givers,
-    /// If it got no grips or was taken from no giver: what keeps hands from the object alone; `None` if they can hold it.
+    /// Why hands cannot hold the object alone, if it is out of reach; `None` if they can.
     in_the_way: Option<String>,
     warnings: Vec<String>,
     error: Option<String>,
@@ -153,20 +152,20 @@ struct Row {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 struct Grips {
     entries: u32,
-    /// True if it does not grow any more.
+    /// True if growth is complete, even without entries.
     complete: bool,
 }
 
-/// From how many test givers an object was taken.
+/// Counts of test givers.
 #[derive(Clone, Debug, Default, Serialize)]
 struct Givers {
-    /// Givers for whom a hold was searched.
+    /// Givers for whom a hold was sought.
     requested: u16,
-    /// Givers that found a hold.
+    /// Givers with a hold.
     tried: u16,
-    /// Those of them that it was taken from.
+    /// Givers from whom the object was taken.
     answered: u16,
-    /// Why it was not taken from the last of the others.
+    /// Why it could not be taken from the last of the other givers.
     last_failure: Option<String>,
 }
 
@@ -182,7 +181,7 @@ impl Row {
             .is_some_and(|grips| grips.iter().any(|hand| hand.entries == 0))
     }
 
-    /// What is odd about it, and why it has no more grips or givers.
+    /// Problems of the object, and why it has no more grips or givers.
     fn notes(&self) -> String {
         let givers = &self.givers;
         let (requested, tried, answered) = (givers.requested, givers.tried, givers.answered);
@@ -237,7 +236,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn notes_say_why_givers_did_not_get_or_give_it() {
+    fn notes_count_givers_without_a_hold_and_failed_takes() {
         let row = Row {
             givers: Givers {
                 requested: 12,

@@ -1,4 +1,4 @@
-//! An answer for people.
+//! Text of an answer.
 
 use std::fmt::Write as _;
 
@@ -47,7 +47,7 @@ pub(super) fn describe(
     text
 }
 
-/// What became of the current grasp, and why.
+/// Status of the current grasp, and the reason.
 fn describe_current(current: &v1::CurrentGraspReport) -> String {
     let mut text = name_of(current.status());
     if !current.moved_digits.is_empty() {

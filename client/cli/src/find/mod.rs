@@ -37,7 +37,7 @@ const VALIDITIES: [Choice<bool>; 2] = [
     ("physical", false, "Solid hands, and forces that hold the object"),
 ];
 
-/// The columns of Figure 5.20.
+/// The columns of the thesis's Figure 5.20.
 const BEND_RATIOS: [Choice<BendRatios>; 6] = [
     ("all", BendRatios::All, "0.7, 1 and 1.42 in turn"),
     (
@@ -115,7 +115,7 @@ pub(crate) struct Arguments {
     /// Checks that a grasp must pass. Default: the server's.
     #[arg(long, value_parser = one_of(VALIDITIES))]
     validity: Option<bool>,
-    /// Bend ratios that fingers try. Default: the strategy's own.
+    /// Bend ratios that fingers try. Default: the strategy's.
     #[arg(long, value_parser = one_of(BEND_RATIOS))]
     bend_ratios: Option<BendRatios>,
     /// Which valid grasp to return. Default: the first.
@@ -142,7 +142,7 @@ pub(crate) struct Arguments {
     /// The rig of the hand to pose: "adult" or "rigs/adult". Default: the server's.
     #[arg(long, value_name = "RIG")]
     receiving_rig: Option<String>,
-    /// Hold on to the grasp of an earlier answer, a file that --json wrote, while it is valid; - for standard input.
+    /// Keep the grasp of an earlier answer while it is valid: a file that --json wrote; - for standard input.
     #[arg(long, value_name = "FILE")]
     current: Option<PathBuf>,
     /// Print the request as JSON instead of sending it.
@@ -160,13 +160,13 @@ pub(crate) struct Arguments {
     /// Pixels of the picture.
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
-    /// Show each grasp that is better than those before as it is found, until the budget ends.
+    /// Show each better grasp as soon as it is found, until the budget ends.
     #[arg(long, conflicts_with_all = ["alternatives", "replay_attempt", "reproducible"])]
     stream: bool,
-    /// Show the best grasps that differ, up to so many (1 to 32), best first, when the budget ends.
+    /// Show up to this many (1 to 32) of the best grasps that differ, best first, when the budget ends.
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["replay_attempt", "reproducible"])]
     alternatives: Option<u32>,
-    /// What they differ by, such as approach,type. Default: approach.
+    /// Criteria by which they differ, such as approach,type. Default: approach.
     #[arg(long, value_name = "WHAT", value_parser = one_of(DIFFERENCES))]
     #[arg(value_delimiter = ',', requires = "alternatives")]
     differ_by: Vec<DifferBy>,
@@ -181,7 +181,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         return Ok(Ending::Done);
     }
     let client = arguments.server.connect().await?;
-    // Reports what cannot be drawn before the search.
+    // Before the search: reports a scene that cannot be drawn.
     let drawing = arguments.drawing(&client, &request).await?;
     if let Some(sent) = arguments.sent() {
         let request = v1::StreamGraspsRequest {
@@ -237,7 +237,7 @@ impl Arguments {
         self.stream.then_some(Sent::MaxRateHz(MAX_RATE_HZ))
     }
 
-    /// What is drawn with grasps, if anything.
+    /// The scene to draw with grasps; `None` without files to write.
     async fn drawing(
         &self,
         client: &GraspClient,
@@ -331,12 +331,12 @@ impl Arguments {
     }
 }
 
-/// Removes a part of a request that says nothing.
+/// Removes a part of a request that has only defaults.
 fn without_default<T: Default + PartialEq>(part: &mut Option<T>) {
     part.take_if(|part| *part == T::default());
 }
 
-/// A holdout's object as it is drawn: a built-in one as it looks, any other by the mesh that the server has of it.
+/// A holdout's object to draw: a built-in one in its own colours, any other from the server's mesh.
 pub(crate) async fn drawn_object(client: &GraspClient, holdout: &v1::Holdout) -> Result<Part, Failure> {
     let name = holdout.object.clone();
     let part = if let Some(part) = Part::built_in_object(&name) {
@@ -396,13 +396,13 @@ fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> Strin
     ])
 }
 
-/// A row of the table, whose widths cannot follow rows that are yet to come.
+/// A row of the table; its widths are fixed, as later rows are unknown.
 fn line([number, score, after, hand, grasp_type, source]: [&str; 6]) -> String {
     let line = format!("{number:>4}  {score:>7}  {after:>11}  {hand:5}  {grasp_type:24}  {source}");
     line.trim_end().to_owned()
 }
 
-/// The last line, after so many grasps.
+/// The last line, after `count` grasps.
 fn summary(count: usize, last: &v1::FindGraspResponse) -> String {
     let what = match last.outcome() {
         Outcome::Found => format!("{count} valid grasps"),

@@ -1,4 +1,4 @@
-//! Objects and atlases for people, and the files of regions and known grips.
+//! Text of objects and atlases, and help on the files of regions and known grips.
 
 use std::collections::BTreeMap;
 
@@ -31,7 +31,7 @@ ones. "hand" of a grasp in the output of `grasp find --json` can be taken as it 
    {"name": "through the cup", "preference": "PREFERENCE_FORBIDDEN", "nearDistance": 0.03, "nearAngle": 0.5, "hand": {
      "rig": "rigs/adult", "handedness": "HANDEDNESS_LEFT", "objectFromWrist": {"position": {"y": 0.1}}}}]"#;
 
-/// The edge lengths of an object's box in millimetres, longest first.
+/// The edge lengths of an object's bounding box in millimetres, longest first.
 pub(super) fn size(object: &v1::GraspObject) -> String {
     let half_extents = object.bounding_box.as_ref().map(v1::BoxShape::half_extents);
     let mut edges = (half_extents.unwrap_or_default() * 2000.0).to_array();
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
     use crate::input::messages_of;
 
-    /// The messages of the example that documentation of a file of them ends with.
+    /// The messages of the example at the end of a file's documentation.
     fn example_of<M: prost::Message + prost::Name + Default>(documentation: &str) -> Vec<M> {
         let start = documentation.find("  [").expect("it has an example");
         let values: Vec<_> = serde_json::from_str(&documentation[start..]).expect("it is JSON");

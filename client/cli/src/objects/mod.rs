@@ -46,7 +46,7 @@ enum Command {
     },
     Create(CreateArguments),
     Update(UpdateArguments),
-    /// Delete an object. Searches that run finish.
+    /// Delete an object. Running searches finish.
     ///
     /// With --json: {"deleted": NAME}.
     Delete {
@@ -69,7 +69,7 @@ enum Command {
         /// The object's name: "remote" or "objects/remote".
         name: String,
     },
-    /// Show the state of an object's atlases, of the grasps that are known in advance for either hand.
+    /// Show the state of an object's atlases, the grasps known in advance for either hand.
     ///
     /// With --json: {"atlases": […]}, each the API's Atlas in protobuf's JSON.
     Atlas {
@@ -112,7 +112,7 @@ async fn atlases(client: &GraspClient, name: &str, output: Output) -> Result<(),
     output.write(&json!({ "atlases": written }), |_| table.to_string())
 }
 
-/// The state of an object's atlas for its "left" or "right" hand; an empty one if the object is gone.
+/// The state of an object's atlas for the "left" or "right" hand; an empty one if the object is gone.
 pub(crate) async fn atlas_of(client: &GraspClient, object: &str, hand: &str) -> Result<Atlas, ClientError> {
     match client.get_atlas(format!("{object}/atlases/{hand}")).await {
         Err(error) if error.code() == Some(Code::NotFound) => Ok(Atlas::default()),
@@ -168,10 +168,10 @@ async fn list(client: &GraspClient, arguments: ListArguments, output: Output) ->
     write_line(&table.to_string())
 }
 
-/// What an object is.
+/// Properties of an object.
 #[derive(Args, Debug)]
 struct Properties {
-    /// Centre of mass in metres after scaling and turning. Default of new objects: that of the mesh's volume.
+    /// Centre of mass in metres after scaling and turning. Default of new objects: the centroid of the mesh's volume.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     centre_of_mass: Option<Vec3>,
     /// Coefficient of static friction between skin and surface. Default of new objects: the server's.
@@ -184,8 +184,8 @@ struct Properties {
     /// update replaces all regions, with the forbidden surfaces.
     #[arg(long, value_name = "FILE")]
     regions: Option<PathBuf>,
-    /// A JSON file with grips of the object, to try first or not to answer; see `grasp objects create --help`. An update replaces
-    /// all known grips.
+    /// A JSON file with preferred or forbidden grips of the object; see `grasp objects create --help`. An update replaces all
+    /// known grips.
     #[arg(long, value_name = "FILE")]
     known_grips: Option<PathBuf>,
     /// A label, such as level=kitchen; may be repeated. An update replaces all labels.
@@ -194,7 +194,7 @@ struct Properties {
 }
 
 impl Properties {
-    /// An object of this name with these properties; the forbidden surfaces are the last of its regions.
+    /// An object of this name with these properties; forbidden surfaces are its last region.
     fn object(self, name: &str) -> Result<v1::GraspObject, Failure> {
         let regions = self.regions.map(|path| read_messages("regions", &path));
         let known_grips = self.known_grips.map(|path| read_messages("known grips", &path));
@@ -244,8 +244,8 @@ struct CreateArguments {
     #[arg(long = "up-axis", value_name = "AXIS", value_parser = one_of(UP_AXES), default_value = "y")]
     #[arg(action = ArgAction::Set)]
     z_up: bool,
-    /// A part of the file that is the object, by the name of a group, object or node; may be repeated. Default: all parts that are
-    /// seen, without colliders and lower levels of detail.
+    /// A group, object or node of the file that belongs to the object; may be repeated. Default: all visible parts, without
+    /// colliders and lower levels of detail.
     #[arg(long = "part", value_name = "NAME")]
     parts: Vec<String>,
     #[command(flatten)]
@@ -283,7 +283,7 @@ struct UpdateArguments {
     /// Change it only if it still has this etag.
     #[arg(long, value_name = "ETAG")]
     etag: Option<String>,
-    /// Metres per unit of the mesh: gives the object another size. What was given in metres or kilograms stays as it is.
+    /// Metres per unit of the mesh: changes the object's size. Properties in metres or kilograms stay as they are.
     #[arg(long, value_name = "METRES")]
     unit_metres: Option<f32>,
     /// Mass in kilograms.
@@ -345,11 +345,11 @@ impl UpdateArguments {
     }
 }
 
-/// Show what happens to objects, until interrupted or the server shuts down.
+/// Show changes of objects until interrupted or the server shuts down.
 ///
-/// Of an object that changes faster than the news are read, several changes come at once, with its latest state.
+/// Changes of an object that come faster than they are read are merged, with its latest state.
 ///
-/// With --json, one line per news: a `WatchObjectsResponse` in protobuf's JSON.
+/// With --json, one line per change: a `WatchObjectsResponse` in protobuf's JSON.
 #[derive(Args, Debug)]
 struct WatchArguments {
     /// Which objects, by labels or the start of the name: `labels.level = "kitchen" AND name = "objects/mug*"`.
@@ -358,7 +358,7 @@ struct WatchArguments {
     /// Show the present objects first.
     #[arg(long)]
     present: bool,
-    /// End after so many news.
+    /// End after this many changes.
     #[arg(long, value_name = "N")]
     count: Option<u64>,
 }
@@ -396,7 +396,7 @@ fn row(news: &WatchObjectsResponse) -> String {
     line(&changes, &object.name, &mass, &atlases, &labels)
 }
 
-/// The state of one of several atlases.
+/// The state of one atlas of several.
 fn of_hand(atlas: &Atlas, count: usize) -> String {
     let state = atlas_state(atlas);
     match atlas.handedness() {
@@ -405,7 +405,7 @@ fn of_hand(atlas: &Atlas, count: usize) -> String {
     }
 }
 
-/// A row, whose widths cannot follow rows that are yet to come.
+/// A row; its widths are fixed, as later rows are unknown.
 fn line(changes: &str, name: &str, mass: &str, atlas: &str, labels: &str) -> String {
     let line = format!("{changes:22}  {name:28}  {mass:>7}  {atlas:18}  {labels}");
     line.trim_end().to_owned()

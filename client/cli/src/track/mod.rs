@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     /// How its giver moves.
     #[arg(long, value_name = "HOW", default_value = "walk", requires = "holdout")]
     moving: Moving,
-    /// How long.
+    /// Length of a built-in motion.
     #[arg(long, value_name = "DURATION", default_value = "5s", value_parser = parse_duration, requires = "holdout")]
     length: Duration,
     /// Frames per second of a built-in motion.
@@ -76,7 +76,7 @@ pub(crate) struct Arguments {
     /// Time limit of the search for a frame whose grasp failed a check. Default: the server's, 8 ms.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
-    /// How late answers are shown: frames are answered as they will be then.
+    /// Delay until answers are shown: frames are predicted ahead by it.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     prediction_horizon: Option<Duration>,
     /// Print the motion as JSON instead of playing it.
@@ -112,7 +112,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         return Ok(Ending::Done);
     }
     let client = arguments.server.connect().await?;
-    // Reports what cannot be drawn before the motion is played.
+    // Before the motion is played: reports a scene that cannot be drawn.
     let object = match (&arguments.glb, &motion.track.holdout) {
         (Some(_), Some(holdout)) => Some(drawn_object(&client, holdout).await?),
         _ => None,
@@ -192,7 +192,7 @@ fn parse_rate(text: &str) -> Result<f32, String> {
     }
 }
 
-/// What has been sent and answered.
+/// Frames sent and answers received.
 struct Played {
     tally: Tally,
     recording: Option<TrackRecording>,
@@ -206,7 +206,7 @@ impl Played {
         let start = Instant::now();
         let first_time = frames.first().and_then(TrackFrame::capture_time);
         let first_time = first_time.unwrap_or_default();
-        // For frames without times: as a headset sends them.
+        // For frames without times: 90 per second, as headsets send them.
         let mut clock = interval(Duration::from_micros(11_111));
         clock.set_missed_tick_behavior(MissedTickBehavior::Burst);
         for frame in frames {
@@ -273,7 +273,7 @@ struct Tally {
     /// When frames that are not answered yet were sent, oldest first.
     sent: VecDeque<(u64, Instant)>,
     last_answered: Option<u64>,
-    /// How many answers have each of [`STATUSES`].
+    /// Number of answers with each of [`STATUSES`].
     counts: [usize; STATUSES.len()],
     answered: usize,
     /// Frames overtaken by later ones.
@@ -281,9 +281,9 @@ struct Tally {
     /// Times in seconds.
     round_trips: Vec<f64>,
     server_times: Vec<f64>,
-    /// Why grasps failed, in words, with how often.
+    /// Why grasps failed, in words, and how often.
     failures: BTreeMap<String, usize>,
-    /// Distances of the object from where it was predicted, in metres; `None` without prediction.
+    /// Distances of the object from its predicted place, in metres; empty without prediction.
     prediction_errors: Vec<f64>,
     /// Number of answers with a warning, and the first one.
     warned: usize,
@@ -336,7 +336,7 @@ impl Tally {
         kept + adjusted + replanned > 0
     }
 
-    /// The names of the statuses, with how many answers have each.
+    /// The names of the statuses, each with its number of answers.
     fn by_status(&self) -> impl Iterator<Item = (&'static str, usize)> {
         STATUSES.into_iter().map(|(_, name)| name).zip(self.counts)
     }

@@ -1,4 +1,4 @@
-//! Built-in motions of givers: each moves a built-in holdout.
+//! Built-in motions of givers.
 
 use std::{f32::consts::TAU, time::Duration};
 
@@ -12,7 +12,7 @@ const GRAVITY: f32 = 9.81;
 /// How a giver moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Moving {
-    /// Holds out, with a hand that is not quite still.
+    /// Holds the object out with a slight tremor.
     Still,
     /// Walks up and down.
     Walk,
@@ -24,11 +24,11 @@ pub(super) enum Moving {
     Slide,
     /// Opens and closes the fingers.
     Fingers,
-    /// Lets go after two seconds: the object falls.
+    /// Drops the object after two seconds.
     Drop,
 }
 
-/// The frames of a motion, as many per second as `rate`.
+/// The frames of a motion, `rate` per second.
 pub(super) fn frames(moving: Moving, holdout: &Holdout, rate: f32, length: Duration) -> Vec<TrackFrame> {
     let count = (length.as_secs_f32() * rate).ceil() as u64;
     let frame = |sequence| {
@@ -107,7 +107,7 @@ fn form(holdout: &mut Holdout) -> Option<&mut Form> {
     holdout.presenting_hand.as_mut()?.form.as_mut()
 }
 
-/// A digit that is opened by a share of the way to straight.
+/// A digit opened by a share of the way to straight.
 fn opened(digit: DigitAngles, share: f32) -> DigitAngles {
     let bent = |angle: f32| angle - 0.6 * share * angle.max(0.0);
     DigitAngles {

@@ -39,7 +39,7 @@ async fn rejections_exit_with_4_and_list_each_violation_on_its_own_line() {
     let unknown = "no object is called objects/anvil";
     for (code, message, details, expected) in [
         (invalid, "the object has 2 errors", two, listed),
-        // A single one is not repeated.
+        // A single violation is not repeated.
         (invalid, "name: is \"anvil/1\"", one, unlisted.to_owned()),
         (Code::NotFound, unknown, missing, format!("error: {unknown}\n")),
     ] {
@@ -103,7 +103,7 @@ async fn no_grasp_within_the_budget_exits_with_3() {
         &json!({"outcome": "OUTCOME_BUDGET_EXHAUSTED", "grasps": null}),
     );
     assert_eq!(answer["report"]["limits"][0]["description"], "mass: 80 kg");
-    // The option overrides the file, and the call may take as much longer.
+    // The option overrides the file, and the call's deadline grows with it.
     let call = &service.calls()[0];
     let budget = call.messages::<v1::FindGraspRequest>()[0].budget();
     assert_eq!(budget, Some(Duration::from_millis(250)));
@@ -132,7 +132,6 @@ async fn usage_errors_exit_with_2_without_a_server() {
         (grasp("health --server nowhere"), "is not a URL"),
         (find.with("--budget 5"), "500ms"),
         (find.with("--strategy G"), "values: A, B, C, D, E, F, GUIDED]"),
-        // Options of streams need each other.
         (find.with("--differ-by type"), "--alternatives"),
         (find.with("--stream --alternatives 2"), "cannot be used with"),
         (find.with("--stream --reproducible"), "cannot be used with"),
@@ -193,7 +192,7 @@ async fn interrupt_ends_a_wait_for_input() {
     // Stays open: the command waits for the rest of the request.
     let mut input = child.stdin.take().unwrap();
     input.write_all(b"{").unwrap();
-    // Should the process have no handler yet, the interrupt ends it, too.
+    // Without a handler yet, the interrupt ends the process, too.
     tokio::time::sleep(Duration::from_millis(200)).await;
     assert_ne!(interrupt(child).code, 0);
     drop(input);

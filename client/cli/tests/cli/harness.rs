@@ -1,4 +1,4 @@
-//! Calls of the command line, the files that they write, and the servers that they call.
+//! Calls of the command line, with their files and servers.
 
 use grasp_server::{Config, config::StorePlace};
 use serde_json::Value;
@@ -19,7 +19,7 @@ pub(crate) struct Call {
     input: String,
 }
 
-/// A call with these arguments, which spaces separate.
+/// A call with these arguments, separated by spaces.
 pub(crate) fn grasp(line: &str) -> Call {
     let call = Call {
         arguments: Vec::new(),
@@ -29,14 +29,14 @@ pub(crate) fn grasp(line: &str) -> Call {
 }
 
 impl Call {
-    /// The same call with further arguments, which spaces separate.
+    /// The same call with further arguments, separated by spaces.
     pub(crate) fn with(&self, line: &str) -> Self {
         let mut call = self.clone();
         call.arguments.extend(line.split_whitespace().map(str::to_owned));
         call
     }
 
-    /// The same call with one further argument, which may contain spaces, such as the name of a file.
+    /// The same call with a further argument that may contain spaces, such as the name of a file.
     pub(crate) fn arg(&self, argument: impl AsRef<OsStr>) -> Self {
         let mut call = self.clone();
         call.arguments
@@ -44,7 +44,7 @@ impl Call {
         call
     }
 
-    /// The same call of this server.
+    /// The same call to this server.
     pub(crate) fn at(&self, url: &str) -> Self {
         self.with("--server").arg(url)
     }
@@ -102,7 +102,7 @@ impl Call {
         self.with("--json").ends_with(0).json()
     }
 
-    /// Runs it; it must end with this exit code and a complaint that contains this.
+    /// Runs it; it must end with this exit code and an error message that contains `expected`.
     #[track_caller]
     pub(crate) fn complains(&self, code: i32, expected: &str) {
         let Ended { stderr, .. } = self.ends_with(code);
@@ -110,7 +110,7 @@ impl Call {
     }
 }
 
-/// What a call wrote, and its exit code.
+/// Output and exit code of a call.
 #[derive(Debug)]
 pub(crate) struct Ended {
     pub(crate) code: i32,
@@ -139,7 +139,7 @@ impl Ended {
         self.stdout.lines().map(parsed).collect()
     }
 
-    /// The error that standard error has as JSON.
+    /// The error on standard error as JSON.
     pub(crate) fn error(&self) -> Value {
         parsed(&self.stderr)["error"].clone()
     }
@@ -149,7 +149,7 @@ fn parsed(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error} in {text:?}"))
 }
 
-/// An object in JSON has these members; null stands for an absent one.
+/// Asserts that an object in JSON has these members; null means absent.
 #[track_caller]
 pub(crate) fn assert_has(object: &Value, members: &Value) {
     for (name, member) in members.as_object().unwrap() {
@@ -157,7 +157,7 @@ pub(crate) fn assert_has(object: &Value, members: &Value) {
     }
 }
 
-/// Some text contains all of these.
+/// Asserts that a text contains all of these.
 #[track_caller]
 pub(crate) fn assert_contains(text: &str, parts: &[&str]) {
     for part in parts {
@@ -184,7 +184,7 @@ pub(crate) fn assert_png(path: impl AsRef<Path>) {
     assert!(fs::read(path).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
 }
 
-/// A file is a scene that mentions all of these.
+/// Asserts that a file is a scene that mentions all of these.
 #[track_caller]
 pub(crate) fn assert_scene(path: impl AsRef<Path>, parts: &[&str]) {
     let scene = fs::read(path).unwrap();
@@ -207,7 +207,7 @@ pub(crate) fn node_points(path: &Path, name: &str) -> Vec<[f32; 3]> {
     points
 }
 
-/// Starts a server on a free port; returns its URL and its end.
+/// Starts a server on a free port; returns its URL and its task.
 pub(crate) async fn serve(
     config: Config,
     stopped: impl Future<Output = ()> + Send + 'static,

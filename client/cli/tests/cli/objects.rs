@@ -130,7 +130,7 @@ impl Server {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_folder_is_registered_once() {
-    // A box that has a manifest, a box of wood without one, and a file that is no mesh.
+    // A box with a manifest, a box of wood without one, and a file that is not a mesh.
     let folder = empty_folder("baked_once");
     file(&folder, "Tea Tin.obj", BOX_OBJ);
     let manifest = "mass_kg = 0.2\n[labels]\nlevel = \"hall\"\n";
@@ -152,7 +152,7 @@ async fn a_folder_is_registered_once() {
     assert!(first[2]["error"].is_string());
     server.stop().await;
 
-    // After a restart, nothing is created again, and a changed file is not taken for the old one.
+    // After a restart, nothing is created again, and a changed file is noticed.
     let server = Server::start(&store).await;
     file(&folder, "Tea Tin.toml", "mass_kg = 0.3\n");
     fs::remove_file(empty).unwrap();
@@ -169,7 +169,7 @@ async fn a_folder_is_registered_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_object_that_no_hand_holds_is_told_with_what_is_in_the_way() {
+async fn bake_reports_why_no_hand_holds_an_object() {
     let folder = empty_folder("baked_in_vain");
     file(&folder, "anvil.obj", BOX_OBJ);
     file(&folder, "anvil.toml", "mass_kg = 80\n");

@@ -1,4 +1,4 @@
-//! Searches from the command line: the demo, pictures, replays, streams, current grasps, verdicts, request files, givers who move.
+//! Searches from the command line: the demo, pictures, replays, streams, current grasps, verdicts, request files, tracks.
 
 use grasp_assets::holdouts::holdouts;
 use grasp_client::v1;
@@ -40,7 +40,7 @@ async fn demo_draws_every_holdout() {
 async fn found_grasp_is_drawn_and_replayed() {
     let folder = empty_folder("a_found_grasp");
     let (png, glb) = (folder.join("grasp.png"), folder.join("grasp.glb"));
-    // Only grasps of an attempt can be replayed, and with an atlas it could start from other grips.
+    // Only grasps of attempts can be replayed, and a replay could start from other grips of an atlas.
     let find = grasp("find --holdout scissors-hold1 --budget 10s --ignore-atlas").at(&real_server().await);
     let draw = find.with("--view-size 48x40 --png").arg(&png);
     let answer = draw.with("--glb").arg(&glb).json();
@@ -89,7 +89,7 @@ async fn pictures_show_the_mesh_that_the_server_has() {
         .input(r#"{"holdout": {"object": "objects/rod"}}"#)
         .at(&url)
         .ends_with(0);
-    // It stands up, in metres.
+    // Upright, in metres.
     let points = node_points(&glb, "object");
     let highest = points.iter().map(|point| point[1]).fold(0.0, f32::max);
     assert!((highest - 0.2).abs() < 1e-4, "{highest}");
@@ -121,7 +121,7 @@ async fn hands_of_created_rigs_are_drawn_with_their_own_skin() {
             .at(&url);
     find.complains(2, "model");
     let found = find.with("--model").arg(model).json();
-    // The rig is a twin of the built-in hand, so joints and skin are as close as there.
+    // The rig is a copy of the built-in hand, so joints and skin are as close.
     let points = node_points(&glb, "receiver_hand");
     let answer: v1::FindGraspResponse = grasp_client::json::from_json(&found).unwrap();
     let contacts = answer.grasp().unwrap().client_contacts();
@@ -198,7 +198,7 @@ async fn found_grasps_are_valid_and_moved_ones_are_not() {
     assert_contains(&moved.ends_with(3).stdout, &["✗"]);
     let nearest = moved.with("--json --find-nearest --budget 500ms");
     let answer = nearest.ends_with(3).json();
-    // False is not written.
+    // JSON omits false.
     assert_eq!(answer.get("valid"), None);
     assert_eq!(answer["nearest"].is_null(), answer["nearestMotion"].is_null());
 
@@ -219,7 +219,7 @@ async fn givers_are_ranked() {
     other.complains(2, "objects/scissors");
 }
 
-/// Prints the request that options make of a file.
+/// Prints the request of a file and options.
 fn print(options: &str, file: &str) -> Call {
     grasp("find --request - --print-request")
         .with(options)
@@ -271,7 +271,7 @@ async fn a_track_is_a_line_per_answer_and_a_summary_and_drawn() {
     let (summary, answers) = lines.split_last().unwrap();
     assert_eq!(summary["frames"], 45);
     assert_eq!(summary["answered"], answers.len());
-    // That of the first frame is 0, which is not written.
+    // The first sequence number is 0, which JSON omits.
     let sequence = |line: &Value| line["sequence"].as_str().unwrap_or("0").parse().unwrap();
     let sequences: Vec<u64> = answers.iter().map(sequence).collect();
     assert!(sequences.is_sorted_by(|a, b| a < b) && sequences.last() == Some(&44));
@@ -287,7 +287,7 @@ async fn a_printed_motion_can_be_played() {
     let play = grasp("track").at(&real_server().await).with("--motion");
     let played = play.arg(printed).with("--prediction-horizon 20ms").text();
     assert_contains(&played, &["predicted"]);
-    // A file that is no motion, and a frame that is wrong, which is answered.
+    // A file that is not a motion, and an invalid frame, which is answered.
     let play = play.with("-");
     play.input("{\"frames\": []}").complains(2, "track");
     motion["frames"][3]["sequence"] = 1.into();

@@ -77,7 +77,7 @@ fn shares_smooth_vertices_and_splits_sharp_ones() {
     assert_eq!(Vertices::of(&tetrahedron).sources.len(), 12);
 }
 
-/// A file with what moves.
+/// A file with its animation.
 struct Played {
     document: gltf::Document,
     blob: Vec<u8>,
@@ -170,7 +170,7 @@ impl Played {
 
 const MOMENTS: usize = 4;
 
-/// A rod that tumbles, a giver who bends the fingers, and a receiver of another size who is gone for a moment.
+/// A rod that tumbles, a giver who bends the fingers, and a receiver of another size who is absent for a moment.
 fn handover() -> MovingHandover {
     let rod = TaperedCapsule::new(Vec3::NEG_X * 0.1, Vec3::X * 0.1, 0.012, 0.012);
     let place = |moment: usize| {
@@ -246,7 +246,7 @@ fn animation_shows_object_and_skins_of_every_moment() {
 }
 
 #[test]
-fn a_hand_that_is_not_there_has_no_size() {
+fn an_absent_hand_has_no_size() {
     let handover = handover();
     let played = Played::of(&to_moving_glb(&handover));
     let animation = played.document.animations().next().expect("an animation");

@@ -1,4 +1,4 @@
-//! Hands that move as a person's: without jumps, to where they are answered to.
+//! Hands move without jumps, to the answered grasps.
 
 use grasp_synthesis::model::hand::joints::index;
 
@@ -73,12 +73,12 @@ fn waits_and_then_approaches_open_from_the_side_of_its_wrist() {
         if bend < 0.4 {
             nearest_open = nearest_open.min(distance);
         }
-        // Fingers as closed as this would push the object away.
+        // Fingers closed this far would push the object away.
         assert!(bend < 0.5 || distance < 0.05, "closed {distance} m before");
         assert!(wrist(&receiver).position.z > target.position.z - 1e-3);
     }
     assert!(nearest_open < 0.05, "{nearest_open} m");
-    // It has arrived, with its fingers.
+    // Wrist and fingers have arrived.
     let expected = posed(
         &receiver.rig,
         target,
@@ -90,7 +90,7 @@ fn waits_and_then_approaches_open_from_the_side_of_its_wrist() {
 }
 
 #[test]
-fn corrects_without_jumps_whatever_is_answered() {
+fn corrects_without_jumps_after_any_answer() {
     // Answers at arbitrary times and places, from a multiplicative congruential generator (Lehmer).
     let mut state = 7_u64;
     let mut random = move || {
@@ -115,7 +115,7 @@ fn corrects_without_jumps_whatever_is_answered() {
         let digits = receiver.posture.digits;
         receiver.advance(FRAME, object);
         let own = (object * moved.inverse()).transform_point(before.position);
-        // Its own motion, with the object or without.
+        // The hand's own motion, whether it follows the object or not.
         let step = wrist(&receiver).position.distance(own);
         let object_step = own.distance(before.position);
         assert!(step <= TOP_SPEED * FRAME + object_step + 1e-5, "{step} m");
