@@ -35,7 +35,7 @@ pub struct Atlas {
     grips: Grips,
     pub(super) complete: bool,
     stamp: u64,
-    /// The plane in which these are mirror images of another hand's grips, whose scores they keep.
+    /// The plane about which these grips mirror another hand's, whose scores they keep.
     pub(super) mirror: Option<Mirror>,
 }
 
@@ -50,8 +50,8 @@ impl Atlas {
         }
     }
 
-    /// The same with a learned grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A hand that is
-    /// already there becomes the newest, which is the last: reproducible requests find the same one repeatedly.
+    /// The atlas with a learned grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A known hand
+    /// becomes the newest, which is the last: reproducible requests find the same one repeatedly.
     #[must_use]
     pub fn with(&self, rig: &Rig, newest: Entry, most: usize) -> Self {
         let mut grips = self.grips.clone();
@@ -76,9 +76,8 @@ impl Atlas {
         nearest_direction(self.mirror.map_or(up, |mirror| mirror.direction(up)))
     }
 
-    /// Indices into [`Atlas::entries`] by falling value under this gravity, with `stance` the value of a forearm's direction for
-    /// where the receiver stands, 0 to 1. Grips that let the object slip come last. Takes some microseconds for hundreds of
-    /// grips.
+    /// Indices into [`Atlas::entries`] by falling value under this gravity, grips that let the object slip last. `stance` rates the
+    /// direction of a forearm for the receiver's position, 0 to 1. Takes some microseconds for hundreds of grips.
     pub fn by_value(&self, up: Vec3, stance: impl Fn(Vec3) -> f32) -> Vec<u16> {
         let direction = self.direction(up);
         let value = |&entry: &u16| {

@@ -53,7 +53,7 @@ const MIN_ENTRY_BYTES: usize = 28 + 25 + 61 + 8 + 4 * WRITTEN_TERMS.len() + 2 + 
 /// Terms of a grip's score that are stored; the others are derived.
 const WRITTEN_TERMS: [Term; 3] = [Term::Closure, Term::Steadiness, Term::SterileDistance];
 
-/// Largest deviation of a quaternion's squared length from 1: a thousand times what rounding causes.
+/// Largest deviation of a quaternion's squared length from 1: a thousand times the rounding error.
 const QUATERNION_SLACK: f32 = 1e-3;
 
 /// Number of hand parts that can touch: 15 phalanges and the palm.
@@ -176,8 +176,8 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
     })
 }
 
-/// One end of an encoding: a [`Writer`] appends the values that it is given, a [`Reader`] replaces them by those that it reads. So
-/// one description of the format serves both.
+/// One end of an encoding: a [`Writer`] appends the values that it is given, a [`Reader`] overwrites them with values that it
+/// reads. So one description of the format serves both.
 trait Codec {
     const READS: bool;
 
@@ -263,7 +263,7 @@ impl Codec for Reader<'_> {
     }
 }
 
-/// What follows the format in the header.
+/// The header after the format.
 #[derive(Default)]
 struct Header {
     key: [u8; KEY_BYTES],
@@ -357,7 +357,7 @@ impl Stored {
         Ok((entry, self.shape))
     }
 
-    /// Passes all values. Those that others determine are derived again.
+    /// Passes all values. Dependent values are derived again.
     fn pass<C: Codec>(&mut self, codec: &mut C, object: &GraspObject, rig: &Rig) -> Result<(), AtlasError> {
         let wrist = &mut self.grip.pose.frame_from_wrist;
         codec.floats(wrist.position.as_mut())?;

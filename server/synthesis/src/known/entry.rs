@@ -35,7 +35,7 @@ pub const SLIPS: u8 = 0;
 pub struct Entry {
     /// The hand on the object.
     pub grip: Grip,
-    /// Where the hand touches.
+    /// Contacts of the hand.
     pub contacts: Vec<Contact>,
     /// Its grasp type in the taxonomy.
     pub classification: Classification,
@@ -134,8 +134,8 @@ impl Entry {
     }
 
     /// A grasp as a known grip for other holdouts of its object, under the friction that it was found with. Its scores by gravity
-    /// and its finger subsets are unknown. `None` if the grasp is not valid under `PHYSICAL`, takes two hands, or if the object
-    /// hangs in it: what hangs falls when the object is held out differently.
+    /// and its finger subsets are unknown. `None` if the grasp is not valid under `PHYSICAL`, takes two hands, or is a hook, from
+    /// which the object drops when held out differently.
     pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
         if grasp.other_hand.is_some() || grasp.hangs {
             return None;

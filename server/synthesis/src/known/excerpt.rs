@@ -1,4 +1,4 @@
-//! The few grips of an atlas that together serve givers best: of many, a server keeps these, and these ship.
+//! Selects the few grips of an atlas that together serve givers best: a server keeps these of many, and these ship.
 //!
 //! The best grips by score lie next to each other on the object, and a giver that obstructs the first obstructs hundreds. So
 //! grips are chosen that complement one another: those that serve a sample of givers best under the directions of gravity. A
@@ -37,11 +37,11 @@ const VALUE_MARGIN: u8 = 40;
 /// Givers whose gains are added at once: a register of bytes.
 const LANES: usize = 32;
 
-/// Directions that the givers' forearms are quantized to, about 36° apart: where the receiver stands need not be known more
-/// exactly, and each direction costs two milliseconds.
+/// Directions that the givers' forearms are quantized to, about 36° apart: the receiver's position need not be known more exactly,
+/// and each direction costs two milliseconds.
 const FOREARMS: usize = 16;
 
-/// Places for givers: those with forearms in the same direction share chunks of [`LANES`] places, of which some stay empty.
+/// Slots for givers: those with forearms in the same direction share chunks of [`LANES`] slots, some of them empty.
 const PLACES: usize = SAMPLED_GIVERS + FOREARMS * LANES;
 
 /// For each place, all bits set if a giver there is clear of a grip, else 0.
@@ -66,7 +66,7 @@ impl Direction {
         for (row, clear_of) in values.iter().zip(clear_of) {
             serve(&mut best, row, chunks, clear_of);
         }
-        // What is so far below the best clear grip does not count.
+        // Grips so far below the best clear one do not count.
         let least = best.map(|best| best.saturating_sub(VALUE_MARGIN));
         Self {
             values,
@@ -200,7 +200,7 @@ pub(super) fn times_listed(entries: &[Entry], occupancy: &Occupancy) -> Vec<(u16
     (0..).zip(times).filter(|&(_, times)| times > 0).collect()
 }
 
-/// For each grip, which givers are clear of it, and the forearms of the givers.
+/// The givers that are clear of each grip, and the forearms of the givers.
 fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<ClearOf>, Chunks) {
     let count = entries.len();
     let givers = count.min(SAMPLED_GIVERS);
@@ -256,7 +256,7 @@ fn values(entries: &[Entry], up: usize) -> Vec<Row> {
     entries.iter().map(row).collect()
 }
 
-/// Serves the givers that are clear of a grip, if it is better than what they have.
+/// Serves the givers clear of a grip that is better than their best so far.
 fn serve(served: &mut Served, row: &Row, chunks: &Chunks, clear_of: &ClearOf) {
     let (served, clear_of) = (served.as_chunks_mut::<LANES>().0, clear_of.as_chunks::<LANES>().0);
     for ((served, clear_of), &forearm) in served.iter_mut().zip(clear_of).zip(chunks) {
@@ -321,7 +321,7 @@ mod tests {
         (0..count).map(grip).unzip()
     }
 
-    /// The objective of a list: by how much the best clear grip of each giver exceeds what does not count.
+    /// The objective of a list: the excess of each giver's best clear grip over the margin.
     fn total_service(list: &[u16], values: &[Row], clear_of: &[ClearOf]) -> u32 {
         let chunks = chunks();
         let best = |entries: &mut dyn Iterator<Item = usize>, giver: usize| {

@@ -1,4 +1,4 @@
-//! Which fingers a grip can do without, and spheres inside a hand that tell quickly which of them a barrier obstructs.
+//! The fingers that a grip can do without, and spheres inside a hand that quickly tell which fingers a barrier obstructs.
 
 use crate::{
     model::hand::Digit,
@@ -8,8 +8,8 @@ use crate::{
 /// Number of fingers, the thumb not included.
 const FINGERS: usize = 4;
 
-/// The finger subsets that hold by themselves. Bit `s` stands for subset `s`, in which bit `f` stands for finger `f`, counted
-/// from the index finger. The thumb is part of every subset.
+/// The finger subsets that hold by themselves. Bit `s` represents subset `s`, in which bit `f` represents finger `f`, counted from
+/// the index finger. The thumb is part of every subset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FingerSubsets(u16);
 
@@ -100,7 +100,7 @@ fn digits(set: u8) -> [bool; 5] {
     std::array::from_fn(|digit| digit == 0 || set >> (digit - 1) & 1 == 1)
 }
 
-/// Spheres inside a hand: whatever comes too close to one of them comes too close to the hand.
+/// Spheres inside a hand: a barrier too close to one of them is too close to the hand.
 pub(super) type InnerSpheres = [(usize, f32); SPHERES];
 
 /// Chosen once by a greedy cover, as `assets/PROVENANCE.md` says; they miss 6.4 % of the collisions of known grips and givers.

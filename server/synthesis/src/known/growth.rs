@@ -1,6 +1,6 @@
-//! Grows atlases in rounds of proposals, half of them fresh and half perturbed from known grips. At most a few similar grips are
-//! kept, the best ones (`spread.rs`). In every other round, a known grip plays the hand that holds the object out, so that the atlas
-//! also serves givers who leave little room.
+//! Grows atlases in rounds of proposals, half of them fresh and half perturbed from known grips. Of similar grips, only the best
+//! few are kept (`spread.rs`). In every other round, a known grip plays the giver's hand, so that the atlas also serves givers who
+//! leave little room.
 //!
 //! A round's proposals depend only on the rounds before it, and their results are admitted in order. So an atlas is the same for
 //! any number of threads and any interruptions.
@@ -61,11 +61,11 @@ pub const CHOSEN: usize = 340;
 /// Proposals per round.
 pub const ROUND: u64 = 64;
 
-/// Proposals after which an atlas is complete even with fewer grips, so that work on objects that cannot be held ends. With half
-/// as many, atlases of thin objects are not filled.
+/// Proposals after which an atlas is complete even with fewer grips, so that work on objects that cannot be held ends. With half as
+/// many, atlases of thin objects are not filled.
 pub const MAX_PROPOSALS: u64 = 400_000;
 
-/// Proposals after which an atlas is stamped: a change of the algorithm shows there after seconds instead of minutes. With fewer,
+/// Proposals after which an atlas is stamped, so that a change of the algorithm shows after seconds instead of minutes. With fewer,
 /// no round has had a giver yet.
 pub const EARLY_PROPOSALS: u64 = 96 * ROUND;
 
@@ -78,7 +78,7 @@ const PERTURBED_SHARE: f32 = 0.5;
 /// Share of fresh proposals that wrap a handle, if the object has one: people hold it there.
 const HANDLE_SHARE: f32 = 0.5;
 
-/// Share of fresh proposals that hold an object where its owner wants hands, and of the kept grips that do.
+/// Share of fresh proposals in a place where the object's owner wants hands, and of the kept grips there.
 const WANTED_SHARE: f32 = 0.5;
 
 /// Seed of the givers.
@@ -164,14 +164,13 @@ impl<'a> Growth<'a> {
         self.len() >= ENTRIES || self.proposed >= MAX_PROPOSALS
     }
 
-    /// True if the growth has so many grips that few more givers would be served by those that are chosen of more, or if it is
-    /// unlikely to find many more.
+    /// True if more grips would serve few more givers, or if many more are unlikely.
     pub fn is_enough(&self) -> bool {
         self.len() >= ENOUGH_GRIPS || self.proposed >= ENOUGH_PROPOSALS || self.is_complete()
     }
 
-    /// What a server keeps: of a growth that is [enough](Self::is_enough), the grips that together serve givers best, up to
-    /// [`CHOSEN`], as a complete atlas from which nothing grows; until then all grips, from which growth resumes.
+    /// The growth that a server keeps: if [enough](Self::is_enough), up to [`CHOSEN`] grips that together serve givers best, as a
+    /// complete atlas that does not grow; until then all grips, from which growth resumes.
     pub fn kept(&self) -> Grown {
         if !self.is_enough() {
             return self.grown();
@@ -184,8 +183,7 @@ impl<'a> Growth<'a> {
         self.with(Grips::new(self.rig, entries.collect()), shapes, true)
     }
 
-    /// The grips that are to be kept because they hold the object where its owner wants hands or, without such wishes, by its
-    /// handle.
+    /// The grips to keep because they hold the object where its owner wants hands or, without such wishes, by its handle.
     fn wanted(&self, entries: &[Entry]) -> Wanted {
         let regions = self.scene.object.regions();
         let is_wanted = |entry: &Entry| {
@@ -208,8 +206,8 @@ impl<'a> Growth<'a> {
         Arc::unwrap_or_clone(self.grown().atlas)
     }
 
-    /// The state of the growth. Once complete, grips with high scores come first: the ones that look-ups try first are then
-    /// adjacent in memory for any gravity.
+    /// The state of the growth. Once complete, grips with high scores come first, so that those tried first are adjacent in memory
+    /// for any gravity.
     pub fn grown(&self) -> Grown {
         let is_complete = self.is_complete();
         let (grips, shapes) = if is_complete {
@@ -406,12 +404,12 @@ pub struct Grown {
     pub proposed: u64,
     /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before.
     pub early_stamp: u64,
-    /// Of a growth that goes on: that of the other hand, if these grips are its mirror images.
+    /// If growth goes on and these grips are mirror images, the growth of the other hand.
     pub(super) original: Option<Arc<Self>>,
 }
 
 impl Grown {
-    /// The growth that goes on: itself, or that of which it is the mirror image.
+    /// The growth that goes on: this one, or the original of its mirror images.
     pub fn original(&self) -> &Self {
         self.original.as_deref().unwrap_or(self)
     }
@@ -424,7 +422,7 @@ impl Grown {
         self.only(rig, listed.map(|(entry, _)| entry))
     }
 
-    /// The grips that are on most shortlists, likewise: as many as are shipped.
+    /// The grips on most shortlists, as many as ship; also an incomplete atlas.
     #[must_use]
     pub fn most_listed(&self, object: &GraspObject, rig: &Rig) -> Self {
         let mut by_count = self.times_listed(object, rig);

@@ -1,13 +1,13 @@
-//! Known grips: how a hand can hold an object, found before anyone holds it out.
+//! Known grips: hands that can hold an object, found before anyone holds it out.
 //!
 //! A grip that passes every check on object and hand alone is valid for every holdout whose giver and gravity allow it. So grips
-//! are collected once per object and rig ([`growth`]) into an [`atlas`]; of a request, only the giver's hand and the forces are left
-//! to check ([`recheck`]). The thesis rejects precomputed grasps because a giver may obstruct all of them (section 1). Hence the
-//! atlas never answers alone: a fresh search runs in parallel. What such searches find is learned and tried after everything else
-//! that is known; reproducible answers do not depend on it.
+//! are collected once per object and rig ([`growth`]) into an [`atlas`]; a request checks only the giver's hand and the forces
+//! ([`recheck`]). The thesis rejects precomputed grasps because a giver may obstruct all of them (section 1). Hence the atlas never
+//! answers alone: a fresh search runs in parallel. Its grasps are learned and tried after all other known grips; reproducible
+//! answers ignore them.
 //!
-//! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]), for an object without an atlas near those
-//! of similar boxes ([`primitives`]). Hands that its owner posed follow a resized surface ([`moved_grips`]).
+//! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]), for an object without an atlas near
+//! those of similar boxes ([`primitives`]). Hands that its owner posed follow a resized surface ([`moved_grips`]).
 
 pub mod atlas;
 pub mod codec;

@@ -1,6 +1,6 @@
-//! Grips elsewhere: a posed hand on its object at another size, whose wrist follows the surface while the digits open or close, and
-//! mirror images on symmetric objects. An image's contacts are found anew, as sharp edges may decide otherwise; one that does not hold
-//! closes its digits again, or is left out.
+//! Grips moved to other surfaces: a hand posed on an object of another size, whose wrist follows the surface while the digits
+//! adapt, and mirror images on symmetric objects. Contacts of an image are found anew, as sharp edges may decide otherwise; an
+//! image that does not hold closes its digits again, or is left out.
 
 use std::sync::Arc;
 
@@ -28,17 +28,17 @@ use crate::{
     rating::scoring::middle,
 };
 
-/// How far the hand may be from where it follows the surface, in steps of metres: along the palm's normal, and toward the
-/// fingertips. What grows between thumb and fingers pushes the palm back.
+/// How far the hand may be from its place on the moved surface, in steps of metres: along the palm's normal, and toward the
+/// fingertips. Whatever grows between thumb and fingers pushes the palm back.
 const STEP: f32 = 0.001;
 const STEPS_OFF_PALM: i32 = 14;
 const STEPS_ALONG_FINGERS: i32 = 12;
 
-/// Every how many steps a hand is tried along the fingers.
+/// Interval, in steps, at which hands are tried along the fingers.
 const STRIDE_ALONG_FINGERS: usize = 4;
 
-/// The hand that holds a resized object, `scale` times as large, like `pose` holds it at its own size, with as many of the same
-/// digits as it can, and as near the same place as that. Without such a hand, the one whose wrist follows the surface.
+/// The hand that holds a resized object, `scale` times as large, like `pose` holds it at its own size: with as many of the same
+/// digits as possible, and as near the same place. If none holds, the hand whose wrist follows the surface.
 pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, pose: &HandPose) -> HandPose {
     let alone = Presented::alone(Vec3::Y);
     let mut gripper = Gripper::default();
@@ -87,7 +87,7 @@ pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, 
     nearly.unwrap_or(following)
 }
 
-/// How the hand moves with its contacts: those of the palm or, without any, of all digits.
+/// The displacement of the hand with its contacts: those of the palm or, without any, of all digits.
 pub(super) fn way_with_contacts(contacts: &[Contact], scale: f32) -> Pose {
     let mut of_palm = contacts
         .iter()

@@ -1,4 +1,4 @@
-//! Boxes with known grips, for objects that have no atlas yet: what is about as long, wide and thick as a box can mostly be held
+//! Boxes with known grips, for objects that have no atlas yet: an object about as long, wide and thick as a box can mostly be held
 //! where the box can. A search for an object without an atlas starts from the grips that fit it ([`TransferredGrips`]). Choosing
 //! grasps by shape primitives follows A. T. Miller, S. Knoop, H. I. Christensen and P. K. Allen, "Automatic Grasp Planning Using
 //! Shape Primitives", ICRA 2003, with tested grips instead of their rules.
@@ -36,8 +36,8 @@ pub struct Primitive {
 const MASS: f32 = 0.1;
 
 impl Primitive {
-    /// All boxes with known grips. They are dense where thickness decides which fingers reach around: from blades and handles
-    /// over pens and bars to a phone, and one as wide as a mug. Easy objects need none.
+    /// All boxes with known grips. They are dense where thickness decides which fingers reach around: from blades and handles over
+    /// pens and bars to a phone, and one as wide as a mug. Easy objects need none.
     pub const ALL: [Self; 12] = [
         Self::of_millimetres(160, 10, 5),
         Self::of_millimetres(160, 12, 3),
@@ -179,7 +179,7 @@ impl TransferredGrips {
         let mut by_similarity: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
         by_similarity.sort_by(|(_, a), (_, b)| bounds.dissimilarity(a).total_cmp(&bounds.dissimilarity(b)));
         let mut fitting: Vec<(f32, Transferred)> = Vec::new();
-        // On a crowded surface, nothing that held a box holds, and finding that out takes seconds.
+        // On a crowded surface no transferred grip holds, and finding that out takes seconds.
         let boxes = if object.surface.is_crowded() {
             0
         } else {

@@ -24,7 +24,7 @@ pub struct GripChecker<'a> {
     around: GraspContext<'a>,
     /// The nearest of [`super::entry::DIRECTIONS`] to the one against gravity.
     direction: usize,
-    /// Does the friction differ from the one that the grips were evaluated under?
+    /// True if the friction differs from that of the grips' evaluation.
     friction_differs: bool,
 }
 
@@ -79,7 +79,7 @@ impl<'a> GripChecker<'a> {
             entry.grip.epsilon
         };
         let arm = self.arm(entry)?;
-        // Gravity is up to 18° from where the use is known from: less may do here, as for the same hand without an atlas.
+        // Gravity is up to 18° from the direction of the stored friction use: less may do here.
         let held = if known_use == FrictionUse::Low {
             held
         } else {

@@ -125,8 +125,8 @@ impl Seeds {
         Ok(Self(nearest.into_iter().map(|(_, seed)| seed).collect()))
     }
 
-    /// A perturbed hand that may be clear of the barriers, if one is drawn: near any seed, as serves many givers, if `evenly`, else
-    /// more often near the first. `entries` are those that the seeds index.
+    /// Draws a perturbed hand that may be clear of the barriers: near any seed if `evenly`, which serves many givers, else more
+    /// often near the first. `entries` are those that the seeds index.
     pub fn propose(
         &self,
         entries: &[Entry],
@@ -144,7 +144,7 @@ impl Seeds {
         Self::perturbed(*self.0.get(rank)?, entries, place, stream)
     }
 
-    /// A hand perturbed from a known grip that may be clear of the barriers, if one is drawn.
+    /// Perturbs a known grip; `None` if no drawn hand may be clear of the barriers.
     fn perturbed(
         Seed { entry, kept }: Seed,
         entries: &[Entry],
@@ -251,7 +251,7 @@ fn solids_of(kept: [bool; 5], solids: &HandSolids) -> impl Iterator<Item = &Tape
         .chain(&solids.forearm)
 }
 
-/// Where seeds come from.
+/// The source of seeds.
 #[derive(Clone, Debug, Default)]
 pub enum SeedSource {
     /// Nowhere.
@@ -275,8 +275,8 @@ impl SeedSource {
         }
     }
 
-    /// Whether an attempt's seeds come from the grips that are more likely to do: those whose forearms come from where the
-    /// receiver stands or, of transferred ones, those that pass the closure screen.
+    /// Whether an attempt takes its seeds from the more promising grips: those whose forearms come from the receiver or, of
+    /// transferred grips, those that pass the closure screen.
     fn prefers(&self, attempt: u64, presented: &Presented) -> bool {
         match self {
             Self::Nothing => false,
@@ -311,7 +311,7 @@ impl SeedSource {
     }
 }
 
-/// The entries of an atlas that hold under this gravity, by falling score, and suit the receiver, if they are to.
+/// The entries of an atlas that hold under this gravity, by falling score, and suit the receiver if required.
 fn candidates<'a>(
     atlas: &'a Atlas,
     suit_receiver: bool,
@@ -324,13 +324,12 @@ fn candidates<'a>(
     })
 }
 
-/// An atlas of an object that is held out at another size or is of another mass. Its grips are known to hold the object as it
-/// was.
+/// An atlas of an object that is held out at another size or mass. Its grips are known to hold only the original.
 #[derive(Clone, Debug)]
 pub struct ResizedGrips {
     /// The atlas.
     pub atlas: Arc<Atlas>,
-    /// How many times as large as that of the atlas the object is.
+    /// Size of the object relative to that of the atlas.
     pub scale: f32,
 }
 

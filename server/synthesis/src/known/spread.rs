@@ -1,5 +1,5 @@
-//! How grips spread: over cells of similar ones, of which an atlas keeps a few, and over the space around the object, where hands
-//! that fill the same cell collide.
+//! Spreads grips over cells of similar ones, of which an atlas keeps a few, and over the space around the object, where hands that
+//! fill the same cell collide.
 
 use std::{cmp::Reverse, collections::HashMap};
 
@@ -24,8 +24,7 @@ const MAX_PER_CELL: usize = 4;
 /// Number of touching fingers from which a hand counts as large: hands with fewer are clear of more givers.
 const MANY_FINGERS: usize = 3;
 
-/// What similar grips have in common: the palm's place, the axes that palm and fingers point along, and whether many fingers
-/// touch.
+/// The cell of similar grips: the palm's place, the axes along which palm and fingers point, and whether many fingers touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Cell(IVec3, [u8; 2], bool);
 
@@ -48,7 +47,7 @@ impl Cell {
     }
 }
 
-/// What happens to a new grip.
+/// Outcome of offering a grip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Admission {
     /// Its cell is full of grips that are as good or better.
@@ -152,7 +151,7 @@ impl Occupancy {
         Self(filled)
     }
 
-    /// Whether grips share a cell with the given one, which does itself: nearly all that collide with it do, and few others.
+    /// Marks the grips that share a cell with the given one, itself included: nearly all that collide with it, and few others.
     pub(super) fn colliding_with(&self, entry: usize) -> impl Fn(usize) -> bool + use<> {
         let mut union = Bits::new();
         for cell in self.0.iter().filter(|cell| has(cell, entry)) {

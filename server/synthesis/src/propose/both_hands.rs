@@ -17,13 +17,13 @@ use crate::{
     physical::shape::{HandShape, Proposal},
 };
 
-/// Locations drawn per proposal, of which the best is used. More find holds of plain objects sooner, but less varied ones.
+/// Locations drawn per proposal; the best is used. More find holds of plain objects sooner, but less varied ones.
 const COMPARED: usize = 4;
 
 /// Share of proposals with the palm on the object where all of it is within a hand's span. Elsewhere, only palms can hold it.
 const MIN_PALM_SHARE: f32 = 0.3;
 
-/// Where one of two hands should be.
+/// Preferred position of one of two hands.
 #[derive(Clone, Copy, Debug)]
 pub enum Aim {
     /// Far from the line along `up`, a unit vector, through `centre`, with palms facing it.
@@ -82,8 +82,8 @@ impl ProposalContext<'_> {
     }
 }
 
-/// Draws the shape of a hand with the palm on what is too wide for one hand: nearly flat under it, so that a thumb far out of the
-/// palm's plane would start inside.
+/// Draws the shape of a hand with the palm on a part too wide for one hand: nearly flat, so that a thumb far out of the palm's
+/// plane does not start inside.
 fn flat_palm_shape(rig: &Rig, stream: &mut AttemptStream) -> HandShape {
     let shape = palm_shape(rig, stream);
     HandShape {
@@ -143,8 +143,8 @@ impl Mirror {
         Some(Self { point, normal })
     }
 
-    /// A plane about which an object is symmetric, with its centre of mass and its forbidden surface, if there is one. Takes less
-    /// than a millisecond. Where hands are wanted, one side may be preferred to the other: there is none then.
+    /// A plane about which an object is symmetric, with its centre of mass and its forbidden surface. Takes less than a
+    /// millisecond. There is none on an object with wishes for hands, as these may prefer one side.
     pub fn of_symmetric(object: &PreparedObject) -> Option<Self> {
         if object.regions().require_contacts() {
             return None;

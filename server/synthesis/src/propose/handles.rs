@@ -1,6 +1,6 @@
-//! Hands that wrap a handle ([`crate::geometry::handles`]) from the palm, and hands that hook their fingers below what an object may
-//! hang by: a thin part above the centre of mass, with room below for a finger and free ways up on both sides of it, while the part
-//! itself goes on to the other two. Spheres of about a finger's thickness probe for that.
+//! Hands that wrap a handle ([`crate::geometry::handles`]) from the palm, and hands that hook their fingers below a part by which
+//! an object may hang. Such a part is thin, above the centre of mass, with room for a finger below and free ways up on both sides
+//! of it, and extends to the other two. Spheres of about a finger's thickness probe for that.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -34,11 +34,11 @@ use crate::{
     },
 };
 
-/// Handles or places to hang by that are drawn per hand; the handle nearest to the centre of mass is wrapped, and the hand hooks
-/// in where the load swings least. With more, a tilted handle is mostly tried at its end.
+/// Handles or places to hang by that are drawn per hand; the handle nearest to the centre of mass is wrapped, and the hand hooks in
+/// where the load swings least. With more, a tilted handle is mostly tried at its end.
 const COMPARED: usize = 2;
 
-/// Breadth of a finger, in metres: so much of a handle each needs.
+/// Breadth of a finger, in metres: the length of handle that each finger takes.
 const FINGER_BREADTH: f32 = 0.02;
 
 /// Largest number of hands tried until palm and forearm fit.
@@ -54,7 +54,7 @@ const PALM_OFFSETS: [[f32; 2]; 2] = [[-0.01, 0.01], [0.012, 0.038]];
 /// Yaw of the thumb as a share of its range: of a hand around a wire, more per metre of the handle's radius, and the spread.
 const THUMB_YAW: [f32; 3] = [0.1, 20.0, 0.2];
 
-/// Range of how far thumb and fingers are closed before, as shares of their range.
+/// Range of how far thumb and fingers are closed at the start, as shares of their range.
 const PRESHAPE: [[f32; 2]; 2] = [[0.15, 0.45], [0.0, 0.3]];
 
 /// Places a hand with a handle across its palm. Returns `None` if there is no handle, or no drawn hand fits.
@@ -162,10 +162,10 @@ const SIDE_HEIGHTS: [f32; 2] = [0.0, 0.015];
 /// Distance in metres from a place at which its part has to go on to both sides: half the breadth of two fingers.
 const HALF_LENGTH: f32 = 0.014;
 
-/// Largest rise of a part over [`HALF_LENGTH`] that is probed, in metres, …
+/// Largest rise of a part over [`HALF_LENGTH`] that is probed, in metres.
 const MAX_RISE: f32 = HALF_LENGTH;
 
-/// … and the largest slope along it, as a sine: 35°. The load slips along a steeper one.
+/// Largest slope of a part that is probed, as a sine: 35°. The load slips along a steeper one.
 const MAX_SLOPE: f32 = 0.57;
 
 /// By how much the ends of a part for four fingers may be off the line along it, in metres: fingers of one hand reach about as
@@ -185,7 +185,7 @@ const MAX_SHARE_ALONG: f32 = 0.45;
 /// Range of the angle in radians by which the hook turns about the bar, fingertips up.
 const TILT: [f32; 2] = [0.0, 0.45];
 
-/// Range of the gap in metres between the lifting links and what they lift before they close.
+/// Range of the gap in metres between the lifting links and the part before they close.
 const GAP: [f32; 2] = [0.0, 0.003];
 
 /// The fingers that hook, with the shares of hands where a part offers room for all; elsewhere, only two do.
@@ -204,9 +204,9 @@ pub struct HangingPlace {
     pub along: Vec3,
     /// Thickness of the part, in metres.
     pub thickness: f32,
-    /// Whether it goes on for the breadth of four fingers.
+    /// True if the part goes on for the breadth of four fingers.
     pub is_broad: bool,
-    /// By how much the load swings until its centre of mass is below, in radians.
+    /// Angle by which the load swings until its centre of mass is below, in radians.
     pub swing: f32,
 }
 
@@ -222,8 +222,7 @@ pub struct HangingPlaces {
 /// Fingers bent to a hook, in the wrist's frame.
 struct Hook {
     shape: HandShape,
-    /// The middle of where the second links lift, at the height of the one that reaches deepest, in metres: the other fingers
-    /// close less.
+    /// Middle of the points where the second links lift, at the height of the deepest, in metres: the other fingers close less.
     middle: Vec3,
     /// From the outermost lifting finger to the innermost, and the direction in which they lift: orthogonal unit vectors.
     along: Vec3,
@@ -365,7 +364,7 @@ fn lifting_point(
     )
 }
 
-/// Where an object may hang by a thin part; the swing is left 0.
+/// The place on a thin part by which an object may hang; its swing is left 0.
 fn probe(surface: &MeshBvh, pair: &SurfacePair, up: Vec3) -> Option<HangingPlace> {
     let finger = finger_below(surface, pair.middle(), MAX_THICKNESS + FINGER_RADIUS, up)?;
     let (a, b) = up.any_orthonormal_pair();
@@ -402,7 +401,7 @@ fn probe(surface: &MeshBvh, pair: &SurfacePair, up: Vec3) -> Option<HangingPlace
     })
 }
 
-/// The highest point at which a finger is free below what is below `start`, within `depth` metres.
+/// The highest free point for a finger under the part below `start`, within `depth` metres.
 fn finger_below(surface: &MeshBvh, start: Vec3, depth: f32, up: Vec3) -> Option<Vec3> {
     let at = |depth: f32| start - up * depth;
     let mut steps = (0..=(depth / STEP) as usize).map(|step| STEP * step as f32);

@@ -117,7 +117,7 @@ pub fn draw_shape(rig: &Rig, width: f32, stream: &mut AttemptStream) -> HandShap
     }
 }
 
-/// The set of digits that a number from 0 to 1 falls on by their shares; the last if they sum to less.
+/// The set of digits that a number from 0 to 1 selects by their shares; the last if they sum to less.
 pub(super) fn drawn_set<const N: usize>(sets: [([bool; 5], f32); N], mut height: f32) -> [bool; 5] {
     let drawn = sets.iter().find(|(_, share)| {
         height -= share;
@@ -201,7 +201,7 @@ struct OpposingHand {
     index_alone: bool,
 }
 
-/// Which of the search parameters move the thumb's pad; the others move the fingers'.
+/// The search parameters that move the thumb's pad; the others move the fingers'.
 const MOVES_THUMB: [bool; 5] = [true, true, false, true, false];
 
 /// The opposed pads of a hand.

@@ -36,7 +36,7 @@ use crate::{
 };
 
 /// Angles tried per joint range for a hand's span, and the factor that covers those between them: cos(7°) for a digit's widest
-/// range, and then some.
+/// range, with a margin.
 const ANGLES: usize = 5;
 const BETWEEN_ANGLES: f32 = 1.03;
 
@@ -103,7 +103,7 @@ pub struct PreparedObject {
     object: Arc<GraspObject>,
     /// The points where opposed digits or the palm may press.
     pub surface_pairs: SurfacePairs,
-    /// Those of them where the object's owner wants hands; empty if that is everywhere.
+    /// The points where the object's owner wants hands; empty if that is everywhere.
     pub wanted_pairs: SurfacePairs,
     /// Bounds on where it may be held.
     pub holdable: HoldableSurface,
@@ -141,7 +141,7 @@ impl PreparedObject {
         })
     }
 
-    /// Memory use in bytes of what is derived from the plain object, placement caches of two hands included.
+    /// Memory use in bytes of the data derived from the plain object, placement caches of two hands included.
     pub fn derived_bytes(&self) -> usize {
         let of_pairs = self.surface_pairs.bytes() + self.wanted_pairs.bytes();
         self.object.derived_bytes() + of_pairs + 2 * PlacementCache::MAX_BYTES
@@ -160,7 +160,7 @@ impl PreparedObject {
         Arc::clone(slot.get_or_init(|| Arc::new(unstopped(|stop| PlacementCache::of_until(self, rig, stop)))))
     }
 
-    /// Builds what [`Self::placement_cache`] returns, unless it is stopped. Meanwhile, others may build it, too.
+    /// Builds the result of [`Self::placement_cache`], unless stopped. Meanwhile, others may build it, too.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -313,7 +313,7 @@ impl PlacementCache {
     /// Upper bound on the size of one cache, in bytes.
     pub const MAX_BYTES: usize = ROWS as usize * KEPT * size_of::<CachedPlacement>();
 
-    /// Samples the placements: about five milliseconds. None on a crowded surface.
+    /// Samples the placements, in about five milliseconds. None on a crowded surface.
     fn of_until(object: &PreparedObject, rig: &PreparedRig, stop: Stop<'_>) -> Result<Self, Stopped> {
         let context = ProposalContext {
             object,
@@ -323,7 +323,7 @@ impl PlacementCache {
             rig,
             placements: None,
         };
-        // Searches sample freely what would take seconds to find here.
+        // Searches sample freely where filling the cache would take seconds.
         let rows = if object.surface.is_crowded() { 0 } else { ROWS };
         let features = ObjectFeatures::of(object);
         let row = |row| {

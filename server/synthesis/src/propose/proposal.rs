@@ -70,11 +70,10 @@ const PALM_OFFSETS: [[f32; 2]; 2] = [[-0.02, 0.02], [-0.02, 0.03]];
 /// Height above the surface from which the palm approaches, in metres.
 pub(super) const PALM_START_HEIGHT: f32 = 0.03;
 
-/// Smallest weight of a hand that does not come from where people take the object: some must be tried, too, because only they may
-/// fit.
+/// Smallest weight of a hand that does not come from a natural side: some must be tried, because only they may fit.
 const MIN_CHOICE_WEIGHT: f32 = 0.03;
 
-/// Share of attempts that place hands wherever they fit, at multiples of this number, for the same reason.
+/// Attempts at multiples of this number place hands wherever they fit, for the same reason.
 pub const ANYWHERE_EVERY: u64 = 8;
 
 /// The object, hands and settings for which proposals are drawn.
@@ -82,15 +81,15 @@ pub const ANYWHERE_EVERY: u64 = 8;
 pub struct ProposalContext<'a> {
     /// The object to be held.
     pub object: &'a GraspObject,
-    /// Where it may be held: the object's pairs and points, or those that the barriers leave free.
+    /// The parts that hands may touch: the object's pairs and points, or those that the barriers leave free.
     pub surface: &'a SurfacePairs,
-    /// What the hand keeps clear of.
+    /// The barriers of the hand.
     pub barriers: Barriers<'a>,
-    /// How the object is presented, if hands are preferred that people would choose.
+    /// The presentation, if natural hands are preferred.
     pub chooses: Option<&'a Presented>,
     /// The receiving hand.
     pub rig: &'a PreparedRig,
-    /// Cached placements to choose from, if they are to be used.
+    /// Cached placements to choose from, if used.
     pub placements: Option<&'a PlacementCache>,
 }
 
@@ -172,7 +171,7 @@ pub fn propose_evenly(
 }
 
 impl<'a> ProposalContext<'a> {
-    /// How likely people are to place a hand so, 0 to 1: from where the receiver stands, not from beneath, and not from an end.
+    /// How natural a hand is, 0 to 1: it comes from the receiver's position, not from beneath, and not from an end.
     pub(super) fn choice(&self, object_from_wrist: Pose) -> f32 {
         let Some(presented) = self.chooses else { return 1.0 };
         presented.receiver.suits(self.rig, object_from_wrist)
@@ -180,14 +179,14 @@ impl<'a> ProposalContext<'a> {
             * (0.2 + 0.8 * from_side_or_above(object_from_wrist, presented.up))
     }
 
-    /// True if a hand is to be tried, by how likely people are to place it so; always in every [`ANYWHERE_EVERY`]th attempt.
+    /// True if a hand is to be tried, at random by how natural it is; always in every [`ANYWHERE_EVERY`]th attempt.
     pub fn is_chosen(&self, object_from_wrist: Pose, stream: &mut AttemptStream) -> bool {
         self.chooses.is_none()
             || stream.attempt().is_multiple_of(ANYWHERE_EVERY)
             || stream.unit() < self.choice(object_from_wrist).max(MIN_CHOICE_WEIGHT)
     }
 
-    /// True if a hand is to be tried at a place, by how much the object's owner wants hands there; always in every
+    /// True if a hand is to be tried at a place, at random by how much the object's owner wants hands there; always in every
     /// [`ANYWHERE_EVERY`]th attempt.
     pub(super) fn is_wanted(&self, wish: f32, stream: &mut AttemptStream) -> bool {
         wish >= 1.0
@@ -327,14 +326,14 @@ impl<'a> ProposalContext<'a> {
         self.rig.oppositions().draw(widths, stream)
     }
 
-    /// A pair clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
+    /// A pair clear of the barriers; `None` if [`MAX_DRAWS`] draws find none.
     pub(super) fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
         self.free(stream, SurfacePairs::pair, |pair| {
             (pair.is_free_of(self.barriers), pair.wish)
         })
     }
 
-    /// What is drawn first that is clear of the barriers and to be tried, by its wish; `None` if none of [`MAX_DRAWS`] is.
+    /// The first draw that is clear of the barriers and to be tried, by its wish; `None` if [`MAX_DRAWS`] draws find none.
     fn free<T>(
         &self,
         stream: &mut AttemptStream,
@@ -351,7 +350,7 @@ impl<'a> ProposalContext<'a> {
         None
     }
 
-    /// A point clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
+    /// A point clear of the barriers; `None` if [`MAX_DRAWS`] draws find none.
     pub(super) fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
         self.free(stream, SurfacePairs::point, |point| {
             (point.is_free_of(self.barriers), point.wish)

@@ -1,6 +1,6 @@
-//! The success prior: a small network, trained on random shapes, that estimates before a hand is closed how likely it is to hold.
-//! Closing the hand decides, but takes a hundred times longer. Its weights are data in `weights.txt`; `assets/PROVENANCE.md` says how
-//! they were trained.
+//! The success prior: a small network, trained on random shapes, that estimates how likely a hand is to hold before it is closed.
+//! Closing the hand decides, but takes a hundred times longer. Its weights are data in `weights.txt`; `assets/PROVENANCE.md`
+//! describes their training.
 
 use std::sync::LazyLock;
 

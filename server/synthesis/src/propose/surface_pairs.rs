@@ -1,5 +1,5 @@
-//! Where opposed digits or the palm may press: points sampled on the surface, and the points opposite them. Outer bounds on where
-//! an object may be held at all.
+//! Points where opposed digits or the palm may press: sampled on the surface, with the points opposite them. Also outer bounds on
+//! the places where an object may be held at all.
 
 use glam::Vec3;
 
@@ -59,7 +59,7 @@ pub struct SurfacePoint {
     pub position: Vec3,
     /// Outward unit normal.
     pub normal: Vec3,
-    /// How much hands should take the object there, from 0 to 1.
+    /// Wish for hands there, from 0 to 1.
     pub wish: f32,
 }
 
@@ -79,7 +79,7 @@ pub struct SurfacePair {
     pub end: Vec3,
     /// Distance between the ends, in metres.
     pub thickness: f32,
-    /// How much hands should take the object there, from 0 to 1.
+    /// Wish for hands there, from 0 to 1.
     pub wish: f32,
 }
 
@@ -180,7 +180,7 @@ impl SurfacePairs {
         )
     }
 
-    /// The pairs and points where the object's owner wants hands at least so much.
+    /// The pairs and points where the object's owner wants hands at least this much.
     #[must_use]
     pub fn wanted(&self, least: f32) -> Self {
         self.filtered(|pair| pair.wish >= least, |point| point.wish >= least)

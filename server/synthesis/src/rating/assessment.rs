@@ -42,7 +42,7 @@ const HOOK: Classification = Classification {
 pub struct GraspContext<'a> {
     /// The object to be held.
     pub object: ObjectScene<'a>,
-    /// How it is presented.
+    /// Its presentation.
     pub presented: &'a Presented,
     /// The receiving hand.
     pub rig: &'a Rig,
@@ -114,11 +114,11 @@ impl GraspContext<'_> {
         gripper.grip(&self.object, self.rig, proposal, presented, stopwatch, stop)
     }
 
-    /// The grasp of a hand that somebody posed: with digits closed or opened as little as it takes to touch or, if that is not
-    /// valid, as they are.
+    /// Closes or opens the digits of a posed hand as little as it takes to touch and assesses the grasp or, if that is not valid,
+    /// the hand as posed.
     ///
     /// # Errors
-    /// The first failed check of the former.
+    /// The first failed check of the touching hand.
     pub fn hold_posed(&self, pose: &HandPose, gripper: &mut Gripper) -> Result<Box<Grasp>, Rejection> {
         let mut hold = |digits| {
             let (grip, solids) = gripper.hold_posed(&self.object, self.rig, pose, self.presented, digits)?;
@@ -127,7 +127,7 @@ impl GraspContext<'_> {
         hold(PosedDigits::Settled).or_else(|failed| hold(PosedDigits::Still).map_err(|_| failed))
     }
 
-    /// The type of a hand. What hangs is in a hook, whatever the fingers look like.
+    /// The type of a hand; always a hook if the load hangs.
     pub fn classification(&self, pose: &HandPose, contacts: &[Contact], hangs: bool) -> Classification {
         if hangs {
             HOOK

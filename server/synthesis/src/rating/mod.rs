@@ -1,4 +1,4 @@
-//! Rates valid grasps: score, taxonomy type and comfort.
+//! Rates valid grasps: [`assessment`] combines the [`scoring`] of terms, the type by [`taxonomy`], comfort and [`stiffness`].
 
 pub mod assessment;
 pub mod scoring;

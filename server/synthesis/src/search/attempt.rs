@@ -1,5 +1,5 @@
-//! One attempt: places, closes and checks a hand according to strategy and validity. If that fails and seeds are known, hands
-//! perturbed from those follow.
+//! One attempt: places a hand by the strategy, closes it and checks its validity. If that fails and seeds are known, it tries hands
+//! perturbed from those. `BothHands` does the same for two hands.
 
 use glam::Vec3;
 
@@ -49,10 +49,10 @@ struct Course<'a, 'b> {
 /// The state of an attempt. Reuse it for the next attempt to keep its buffers.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    /// How many placements the pruning measures discarded before accepting one.
+    /// Placements that the pruning measures discarded before the accepted one.
     pub pruned_placements: u64,
     wrist: WristFrame,
-    /// The digits posed by this attempt, thumb first.
+    /// The digits posed so far, thumb first.
     posed: Vec<DigitAngles>,
     thesis: ThesisAttempt,
     gripper: Gripper,
@@ -75,7 +75,7 @@ impl Default for Attempt {
 }
 
 impl Attempt {
-    /// Where the attempt placed the wrist.
+    /// The pose of the wrist.
     pub fn wrist(&self) -> &WristFrame {
         &self.wrist
     }
@@ -91,7 +91,7 @@ impl Attempt {
         self.thesis.posed_digits()
     }
 
-    /// The hand as far as the attempt got; digits that it did not pose are stretched.
+    /// The hand so far; digits not yet posed are stretched.
     pub fn pose(&self, scene: &Scene<'_>) -> HandPose {
         let mut digits = scene.task.rig.stretched();
         for (angles, posed) in digits.iter_mut().zip(&self.posed) {
@@ -103,9 +103,8 @@ impl Attempt {
         }
     }
 
-    /// Tries a freshly placed hand, and, if that fails and seeds are known, some hands perturbed from those; or two hands
-    /// together if the search asks for both.
-    /// Asks `stop` at least every 50 µs or so of work.
+    /// Tries a freshly placed hand and, if that fails and seeds are known, some hands perturbed from those; or two hands together,
+    /// if requested. Asks `stop` at least every 50 µs or so of work.
     ///
     /// # Errors
     /// The first failed check of the freshly placed hand, or the stop.
@@ -140,7 +139,7 @@ impl Attempt {
         seeded.map_or(fresh, Ok)
     }
 
-    /// Algorithm 1, with the wrist placed according to the strategy.
+    /// Runs Algorithm 1 with the wrist placed by the strategy.
     fn try_by_thesis(&mut self, course: &mut Course<'_, '_>) -> Result<Box<Grasp>, Failure> {
         let Course { scene, stop, .. } = *course;
         let place_wrist = |stream: &mut AttemptStream| {
@@ -165,7 +164,7 @@ impl Attempt {
         }
     }
 
-    /// `PHYSICAL` validity, with the hand placed according to the strategy.
+    /// Seeks a grasp of `PHYSICAL` validity with the hand placed by the strategy.
     fn try_physically(
         &mut self,
         around: &GraspContext<'_>,
@@ -259,11 +258,11 @@ fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure
     admitted.ok_or_else(|| Rejection::UnmetRequirement.into())
 }
 
-/// Consecutive perturbations without improvement after which a near miss is given up.
+/// Consecutive perturbations without improvement before a near miss is given up.
 const MAX_FAILED_REFINEMENTS: usize = 4;
 
-/// Closes and checks a proposed hand. If it nearly has enough closure, perturbs it repeatedly, each time from the hand with most
-/// closure so far.
+/// Closes and checks a proposed hand. If it nearly has enough closure, perturbs it repeatedly, always from the hand with most
+/// closure.
 ///
 /// # Errors
 /// The first check that the proposed hand fails, an unmet requirement if a perturbed hand fails nothing else, or the stop signal.
@@ -287,7 +286,7 @@ pub fn hold_or_refine(
         failures += 1;
         let perturbed = nearest.1.perturbed(stream);
         match around.hold(&perturbed, gripper, stopwatch, stop) {
-            // The hand holds, but not as the requirements demand.
+            // The hand holds the object but violates the requirements.
             Err(unmet) if unmet == Rejection::UnmetRequirement.into() => {
                 rejected = Err(unmet);
                 break;
@@ -307,14 +306,14 @@ pub fn hold_or_refine(
 /// Hands tried opposite a hand that holds its side. More find holds of lopsided objects sooner, those of others later.
 const OTHER_HANDS: usize = 8;
 
-/// Share of attempts whose first hand must have a mirror image that suits the same body. The others find holds without symmetry.
+/// Share of attempts whose first hand must have a mirror image that suits the same body. The others serve objects without symmetry.
 const SYMMETRIC_SHARE: f32 = 0.75;
 
-/// The first hand of an attempt, as far as it got, and the buffers of both.
+/// The first hand of an attempt, and the buffers of both.
 #[derive(Clone, Debug)]
 struct BothHands {
     first: Gripper,
-    /// Where the first hand's wrist was placed; `None` if no placement fits.
+    /// Wrist pose at which the first hand was placed; `None` if no placement fits.
     placed: Option<Pose>,
     other: Gripper,
     buffers: Buffers,
@@ -331,7 +330,7 @@ impl Default for BothHands {
     }
 }
 
-/// A first hand that holds its side, and what the other hand needs to know of it.
+/// A first hand that holds its side, and the data that the other hand needs.
 struct First<'a> {
     around: &'a GraspContext<'a>,
     proposal: Proposal,

@@ -1,4 +1,4 @@
-//! How well a holdout lets an object be taken: all known grips, checked against it one by one.
+//! Rates how well a holdout lets an object be taken: checks all known grips against it.
 
 use glam::Vec3;
 
@@ -22,8 +22,8 @@ use crate::{
     },
 };
 
-/// What may keep a hand from an object. A grip that several keep from it counts for the first of them. Of these, balance is lost
-/// as the weight pulls, and a banned grip is one of the requirements.
+/// Checks that may keep a hand from an object. A grip that fails several counts for the first. Balance is checked under the actual
+/// gravity; a banned grip fails the requirements.
 pub const HINDRANCES: [Check; 6] = [
     Check::GiverClearance,
     Check::OtherHandsClearance,
@@ -39,11 +39,11 @@ pub const SIDES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::
 /// The known grips of one side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Side {
-    /// How many there are.
+    /// Number of grips.
     pub known: u32,
-    /// How many of them are valid.
+    /// Number of valid grips.
     pub valid: u32,
-    /// The best score of these; 0 without any.
+    /// Best score of the valid grips; 0 if there are none.
     pub best_score: f32,
 }
 
@@ -52,7 +52,7 @@ pub struct Side {
 pub struct Evaluation {
     /// The sides, in the order of [`SIDES`].
     pub sides: [Side; 6],
-    /// How many grips each of [`HINDRANCES`] keeps from the object.
+    /// Number of grips that fail each of [`HINDRANCES`].
     pub hindered: [u32; 6],
 }
 
@@ -62,22 +62,22 @@ impl Evaluation {
         self.sides.iter().map(|side| side.known).sum()
     }
 
-    /// How many of them are valid.
+    /// Number of valid grips.
     pub fn valid(&self) -> u32 {
         self.sides.iter().map(|side| side.valid).sum()
     }
 
-    /// The best score of these; 0 without any.
+    /// Best score of the valid grips; 0 if there are none.
     pub fn best_score(&self) -> f32 {
         self.sides.iter().map(|side| side.best_score).fold(0.0, f32::max)
     }
 
-    /// How many grips something keeps from the object.
+    /// Number of grips that fail a check.
     pub fn hindered_by(&self, what: Check) -> u32 {
         place_of(what).map_or(0, |place| self.hindered[place])
     }
 
-    /// Both together.
+    /// The sum of two evaluations.
     #[must_use]
     pub fn with(mut self, other: &Self) -> Self {
         for (side, other) in self.sides.iter_mut().zip(&other.sides) {
@@ -92,9 +92,8 @@ impl Evaluation {
     }
 }
 
-/// Checks the known grips of the settings, preferred ones and those of the atlas by falling score, against a holdout under
-/// `PHYSICAL` validity. Takes some microseconds for each that nothing is in the way of. Ends early if `stop` says so: then the
-/// others do not count.
+/// Checks the known grips of the settings, preferred ones and then the atlas by falling score, against a holdout under `PHYSICAL`
+/// validity. Takes some microseconds per unobstructed grip. Once `stop` ends it, the remaining grips do not count.
 pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Evaluation {
     let Task { holdout, rig, .. } = task;
     let query = &settings.query;
@@ -143,10 +142,10 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
         if stop.check().is_err() {
             return evaluation;
         }
-        // One that does not hold the object at all is no grip.
+        // A hand that does not hold the object at all is no grip.
         let mut hold = |digits| gripper.hold_posed(&around.object, rig, pose, &alone, digits).ok();
         let held = hold(PosedDigits::Settled).or_else(|| hold(PosedDigits::Still));
-        // What hangs is no grip for other directions of gravity.
+        // A hooked object hangs under one direction of gravity only.
         if let Some((grip, solids)) = held
             && gripper.hang.is_none()
         {

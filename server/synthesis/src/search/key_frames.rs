@@ -31,8 +31,8 @@ use crate::{
     rating::assessment::GraspContext,
 };
 
-/// Least distance of the hand of `PRE_GRASP` from the object, in metres: visibly not touching yet. More opens hands wider and
-/// finds fewer motions.
+/// Least distance of the hand of `PRE_GRASP` from the object, in metres: visibly apart. More opens hands wider and finds fewer
+/// motions.
 pub const OPEN_CLEARANCE: f32 = 0.002;
 
 /// Distance from `APPROACH` to `PRE_GRASP`, in metres: more than a finger's length, so that the hand is clear of the object. More
@@ -42,21 +42,20 @@ pub const APPROACH_DISTANCE: f32 = 0.12;
 /// Distances by which fingertips open, in metres, or as far as the joints allow.
 const OPENINGS: [f32; 5] = [0.025, 0.035, 0.05, 0.07, f32::INFINITY];
 
-/// Distances from `PRE_GRASP` to `CLOSE`, in metres: none if the hand can open in place, and some for a palm that rests on the
-/// object.
+/// Distances from `PRE_GRASP` to `CLOSE`, in metres: zero for a hand that opens in place, more for a palm that rests on the object.
 const BACK_OFFS: [f32; 3] = [0.0, 0.01, 0.025];
 
 /// Angles, in degrees, by which alternative approach directions deviate from the natural one.
 const TILTS: [f32; 4] = [20.0, 40.0, 60.0, 80.0];
 
-/// Where they lie around it, in degrees from the fingertips' side toward the thumb's: first those that keep the hand upright,
+/// Directions of these deviations, in degrees from the fingertips' side toward the thumb's: first those that keep the hand upright,
 /// straight ahead along the forearm or down on the palm.
 const AZIMUTHS: [f32; 8] = [0.0, 180.0, 90.0, 270.0, 45.0, 315.0, 135.0, 225.0];
 
-/// Largest number of hand poses checked per grasp, in some milliseconds. One in a hundred grasps needs more than half of them.
+/// Largest number of hand poses checked per grasp, in some milliseconds. One grasp in a hundred needs more than half of them.
 const MAX_POSES_CHECKED: u32 = 2000;
 
-/// Largest number of hand poses checked for a withdrawal: a tenth of that, in some hundred microseconds.
+/// Largest number of hand poses checked for a withdrawal: a tenth, in some hundred microseconds.
 const MAX_POSES_OF_WITHDRAWAL: u32 = 200;
 
 /// Least distance from the barriers on the way, in metres: a little less than in a grasp, so that the accuracy of the check does
@@ -127,14 +126,14 @@ struct Planner<'a> {
     rig: &'a Rig,
     approach: Option<ApproachCone>,
     close: HandPose,
-    /// Which digits hold the object, thumb first.
+    /// The digits that hold the object, thumb first.
     holding: [bool; 5],
     obstacles: Obstacles<'a>,
 }
 
 impl Planner<'_> {
     fn plan(&self) -> Option<(Vec3, HandPose)> {
-        // Digits that hold nothing open with the others, or else stay where they are.
+        // Digits that hold nothing open with the others, or else keep their pose.
         let opening_digits = |i: usize| {
             if i < OPENINGS.len() {
                 [true; 5]
@@ -204,8 +203,8 @@ impl Planner<'_> {
         closed.toward(&open, (opening / whole).min(1.0))
     }
 
-    /// An open hand, `back` metres before the grasp, with each digit opened as little as possible: a digit whose first link lies
-    /// on the object has to open far, the others need not.
+    /// An open hand, `back` metres before the grasp. Each digit opens as little as possible: only one whose first link lies on the
+    /// object has to open far.
     fn narrowed(
         &self,
         mut pose: HandPose,
@@ -348,8 +347,8 @@ impl Planner<'_> {
     }
 }
 
-/// Where a hand withdraws to whose grasp is no longer valid, in the object's frame: the opened hand, drawn back by
-/// [`APPROACH_DISTANCE`] against a direction of approach.
+/// The pose to which a hand withdraws from an invalid grasp, in the object's frame: opened, and drawn back by [`APPROACH_DISTANCE`]
+/// against a direction of approach.
 pub(super) fn withdrawal(around: &GraspContext<'_>, hand: &HandPose) -> HandPose {
     let planner = Planner {
         rig: around.rig,
@@ -394,12 +393,12 @@ const RESOLUTION: f32 = 0.0001;
 /// Search distance beyond the known lower bound of an obstacle's distance, in metres.
 const LOOKAHEAD: f32 = 0.008;
 
-/// What a moving hand may collide with.
+/// The obstacles of a moving hand: object, barriers and itself.
 #[derive(Debug)]
 struct Obstacles<'a> {
     object: &'a GraspObject,
     barriers: Barriers<'a>,
-    /// How many more hand poses may be checked before the motion counts as blocked: bounds the time of hopeless cases.
+    /// Hand poses that may still be checked before the motion counts as blocked, to limit hopeless cases.
     poses_left: Cell<u32>,
 }
 

@@ -1,7 +1,7 @@
-//! Known grips as candidates of a race: preferred hands, those of the atlas, then learned ones.
+//! Known grips as candidates of a race: preferred hands, the atlas, then learned grips.
 //!
-//! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, by falling value and then by
-//! falling score; only if none of them is valid, those of the next grade.
+//! A search for the first valid grasp tries the atlas by [`Grade`]: first the natural grips, by falling value and then by falling
+//! score; the next grade only if none of them is valid.
 
 use std::sync::{
     OnceLock,
@@ -37,14 +37,14 @@ const GRIPS_PER_CLOCK_CHECK: usize = 64;
 pub(super) struct KnownGrips<'a> {
     preferred: &'a [HandPose],
     atlas: Option<&'a Atlas>,
-    /// All grips of the atlas by falling value, the order of the first pass where there are barriers and any valid grasp ends the
-    /// search.
+    /// The atlas by falling value: the order of the first pass of a search for the first valid grasp, if there are barriers or a
+    /// receiver.
     by_value: Option<Vec<u16>>,
-    /// All grips of the atlas by falling score, computed on first use.
+    /// The atlas by falling score, computed on first use.
     by_score: OnceLock<Vec<u16>>,
-    /// What grips are graded by; `None` if all are alike.
+    /// The data that grades grips; `None` if grades do not matter.
     grading: Option<Grading<'a>>,
-    /// Grips that earlier searches found. Mostly they are worse than those of the atlas, which are a selection.
+    /// Grips that earlier searches found, mostly worse than the selection in the atlas.
     learned: Option<&'a Atlas>,
     around: GraspContext<'a>,
     checker: GripChecker<'a>,
@@ -96,7 +96,7 @@ impl<'a> KnownGrips<'a> {
         })
     }
 
-    /// How many have been tried or excluded, including those that other workers are trying.
+    /// The number of grips tried or excluded, including those that other workers are trying.
     pub(super) fn tried(&self) -> usize {
         self.cursor.load(Ordering::Relaxed)
     }
@@ -118,8 +118,8 @@ impl<'a> KnownGrips<'a> {
         self.learned.map_or(0, |learned| learned.entries().len())
     }
 
-    /// The next grip that is valid, unless `is_over` says first that its time is over. Between two of its calls, at most
-    /// [`GRIPS_PER_CLOCK_CHECK`] grips are skipped that certainly collide with a barrier.
+    /// The next valid grip, until `is_over`. Between two calls of it, at most [`GRIPS_PER_CLOCK_CHECK`] grips are skipped that
+    /// certainly collide with a barrier.
     pub(super) fn next_valid(
         &self,
         gripper: &mut Gripper,
@@ -152,7 +152,7 @@ impl<'a> KnownGrips<'a> {
                 .cursor
                 .compare_exchange(from, to, Ordering::Relaxed, Ordering::Relaxed);
             if taken.is_err() {
-                // Another worker took the same grips meanwhile.
+                // Another worker took the same grips.
                 continue;
             }
             let valid = if let Some(hand) = preferred {
@@ -174,10 +174,10 @@ impl<'a> KnownGrips<'a> {
         None
     }
 
-    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than those
-    /// tried there.
+    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has the wrong grade for that
+    /// place.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
-        // All passes precede the learned grips, unless those that follow hold the object where its owner would not.
+        // Learned grips follow all passes or, if the owner wants a region, the passes inside it.
         let before_learned = self.atlas_len()
             * if self.wants_region() {
                 CHOSEN_GRADES
@@ -222,7 +222,7 @@ impl<'a> KnownGrips<'a> {
         })
     }
 
-    /// A grip of the atlas, unless it certainly collides with a barrier or is not tried in a pass.
+    /// A grip of the atlas, unless it certainly collides with a barrier or is not tried in this pass.
     fn screened(&self, index: u16, pass: usize) -> Option<Candidate<'a>> {
         let grips = self.atlas?.grips();
         let place = usize::from(index);
@@ -261,25 +261,25 @@ pub(super) fn grasp_value(grasp: &Grasp) -> f32 {
     other.map_or(value, |other| 0.5 * (value + grasp_value(other)))
 }
 
-/// The first grades of known grips, which hold the object where its owner would.
+/// The number of first grades, whose grips hold the object where its owner wants hands.
 pub(super) const CHOSEN_GRADES: usize = 2;
 
-/// How a known grip suits where the receiver stands and what people choose.
+/// How well a known grip suits the receiver's position and human habits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Grade {
-    /// Its forearm comes from there, people would take the object so, and its owner would have it taken there.
+    /// The forearm comes from the receiver, and the grip is natural and where the owner wants it.
     Chosen,
-    /// Its forearm comes from there, and it holds what people would hold, firmly, where the owner would have it.
+    /// The forearm comes from the receiver, and the grip is firm and where the owner wants it.
     Firm,
-    /// Its forearm comes from there.
+    /// The forearm comes from the receiver.
     Suitable,
-    /// Its forearm comes roughly from there.
+    /// The forearm comes roughly from the receiver.
     Possible,
-    /// It holds.
+    /// The grip holds.
     Valid,
 }
 
-/// What grips are graded by.
+/// The data that grades grips.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grading<'a> {
     pub(super) receiver: &'a Receiver,
@@ -288,19 +288,19 @@ pub(super) struct Grading<'a> {
     pub(super) regions: &'a Regions,
 }
 
-/// Whether a grip has a grade, as far as tells what is quickly looked at.
+/// Whether a grip has a grade, by the cheap tests alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fit {
     No,
     Yes,
     /// If the receiver's arm reaches the wrist.
     IfReached,
-    /// Unless it does.
+    /// If the receiver's arm does not reach the wrist.
     UnlessReached,
 }
 
 impl Grading<'_> {
-    /// True if the object's owner prefers a region that is free, and the contacts of a grip are elsewhere.
+    /// True if the contacts are outside a free region that the object's owner prefers.
     pub(super) fn is_beside_region(&self, contacts: &[Contact]) -> bool {
         self.preference.wants_region && !suits_owner(&self.regions.values(contacts))
     }
@@ -330,7 +330,7 @@ impl Grading<'_> {
         if fits { Fit::IfReached } else { Fit::No }
     }
 
-    /// True if a grip that may have a grade has it. Takes about a microsecond unless the fit tells.
+    /// Completes [`Self::fit`] by the test of the arm, which takes about a microsecond.
     pub(super) fn has(&self, fit: Fit, entry: &Entry) -> bool {
         let is_reached = || self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist) >= SUITABLE;
         match fit {
@@ -341,7 +341,7 @@ impl Grading<'_> {
         }
     }
 
-    /// The grades that there are, best first: all grips are passed once for each.
+    /// The applicable grades, best first; each is a pass through the atlas.
     pub(super) fn grades(&self) -> &'static [Grade] {
         let all = &[
             Grade::Chosen,

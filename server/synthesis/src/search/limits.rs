@@ -1,5 +1,5 @@
-//! What keeps one hand from holding an object: conditions that every valid grasp meets, and that this holdout cannot. They are not
-//! sufficient: a search that finds nothing although no limit applies may have had too little time.
+//! Limits that keep one hand from holding an object: conditions of every valid grasp that this holdout cannot meet. They are not
+//! sufficient: if no limit applies, a search may still fail for lack of time.
 
 use std::fmt;
 
@@ -32,7 +32,7 @@ use crate::{
     rating::scoring::middle,
 };
 
-/// What all contacts of a hand can push together, in newtons.
+/// Largest total force of a hand's contacts, in newtons.
 const HAND_FORCE: f32 = MAX_CONTACTS as f32 * MAX_CONTACT_FORCE;
 
 /// Largest distance of points from the centre of the smallest ball around them, over the largest distance of two: √(3/8), by
@@ -42,15 +42,15 @@ const JUNG: f32 = 0.612_373;
 /// Friction up to which normals that are pairwise at most a right angle apart cannot hold.
 const MAX_FRICTION_OF_WIDTH: f32 = 0.6;
 
-/// How far apart palm and fingers may be that press against each other, over the widest opening of thumb and fingers: hands that
-/// hold in the palm reach a little farther.
+/// Largest distance between opposed palm and fingers, over the widest opening of thumb and fingers: hands that hold in the palm
+/// reach a little farther.
 const PALM_OVER_PADS: f32 = 1.25;
 
-/// Height above a touched point, over the finger's radius, of a point that is at least as far from the giver: it is inside the
-/// finger, up to a millimetre less deep than high, even if the bone is 45° off the normal.
+/// Height above a touched point, over the finger's radius, that is surely inside the finger, even with the bone 45° off the normal.
+/// As the finger clears the giver, that point is at least as far from the giver.
 const INSIDE_FINGER: f32 = 0.3;
 
-/// Share of the grips from which on obstacles are what is in the way.
+/// Share of blocked grips from which on obstacles count as the limit.
 const MOST: f32 = 0.5;
 
 /// Most known grips that are compared with obstacles, evenly among all: enough to tell most from few, in some tenths of a
@@ -64,7 +64,7 @@ pub struct Limit {
     pub check: Check,
     /// The figure of this holdout, in the unit of the check.
     pub value: f32,
-    /// The bound that a valid grasp needs it to keep, in the same unit; `None` where there is no bound in advance.
+    /// The bound that valid grasps keep, in the same unit; `None` if there is none in advance.
     pub bound: Option<f32>,
 }
 
@@ -107,8 +107,8 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     .collect()
 }
 
-/// Obstacles, if they are in the way of most known grips or, without any, of all opposed places; or else the weight's torque, if
-/// none of the known grips resists it. Unlike the other limits, this one proves nothing: known grips are many, not all.
+/// Obstacles, if they block most known grips or, without any, all opposed places; or else the weight's torque, if no known grip
+/// resists it. Unlike the other limits, this one proves nothing, as known grips are not all grips.
 pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
     let Task { holdout, object, rig } = task;
     let presented = Presented::of(holdout);
@@ -165,7 +165,7 @@ fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f3
     Limit::if_exceeded(Check::Torque, weight * arm, bound)
 }
 
-/// Contacts that hold have normals more than a right angle apart, at most an opening from each other.
+/// Contacts that hold have normals more than a right angle apart, and lie within an opening of each other.
 fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Option<Limit> {
     let forbidden = Limit::new(Check::Forbidden, holdable.forbidden_share, None);
     if holdable.region.is_none() {
@@ -180,7 +180,7 @@ fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Optio
     )
 }
 
-/// The thinnest finger fits nowhere between the object and the giver.
+/// The room of the thinnest finger between object and giver.
 fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Option<Limit> {
     let giver: &PreparedHand = presented.hands.first()?;
     let digits = Digit::ALL.into_iter().filter(|&digit| rig.has(digit));

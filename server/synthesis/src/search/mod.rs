@@ -1,4 +1,13 @@
-//! The search: workers run attempts by index until a valid grasp is found, the deadline passes or they are stopped.
+//! The search for a valid grasp, step by step:
+//!
+//! 1. [`settings`] holds the query, the known grips and the options of a run; [`scene`], the data that all attempts share.
+//! 2. [`current`] keeps, adjusts or replaces the grasp that the character already holds on to.
+//! 3. `known_grips` tries preferred hands, the atlas and learned grips, natural ones (`preference`) first.
+//! 4. `race` runs each [`attempt`] by index on several workers until one succeeds, time is up or the search is stopped.
+//! 5. [`report`] sums up the search and keeps alternatives; [`limits`] explains why no grasp exists.
+//! 6. [`key_frames`] plans the motion to the grasp.
+//!
+//! [`evaluation`] rates a holdout by its known grips; [`verdicts`] checks a hand that a client posed. Neither searches.
 
 pub mod attempt;
 pub mod current;
@@ -36,11 +45,11 @@ pub enum SearchEnd {
     Found,
     /// The deadline passed first.
     DeadlinePassed,
-    /// All attempts were used up.
+    /// All attempts are used up.
     AttemptsExhausted,
-    /// It was stopped.
+    /// The search was stopped.
     Stopped,
-    /// It did not start: the current grasp is committed and not valid.
+    /// The search did not start: the current grasp is committed and not valid.
     Aborted,
 }
 
@@ -51,26 +60,26 @@ pub struct SearchOutcome {
     pub end: SearchEnd,
     /// The grasp, if one was found.
     pub grasp: Option<Grasp>,
-    /// Its quality; higher is better.
+    /// Quality of the grasp; higher is better.
     pub value: f32,
-    /// If a person would rather choose another grasp: until when such a one replaces it. That may be after the search's last
-    /// attempt or its deadline.
+    /// Until when a natural grasp replaces this one, if this one is not natural. May be after the search's last attempt or
+    /// deadline.
     pub replaceable_until: Option<Replaceable>,
-    /// What the search did.
+    /// Statistics of the search.
     pub report: SearchReport,
 }
 
-/// Until when a valid grasp that a person would not choose may be replaced.
+/// Until when a natural grasp may replace a valid one that is not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Replaceable {
-    /// By attempts up to this one, if the search is reproducible.
+    /// Up to this attempt, if the search is reproducible.
     UntilAttempt(u64),
     /// Until this time on the search's clock.
     UntilTime(Duration),
 }
 
 impl Replaceable {
-    /// The earlier end of two of the same search.
+    /// The earlier of two ends of the same search.
     #[must_use]
     pub fn earlier(self, other: Self) -> Self {
         match (self, other) {
@@ -81,11 +90,11 @@ impl Replaceable {
     }
 }
 
-/// Looks for a valid grip among the known ones in `settings`, for up to `within` and on the calling thread only. Applies to
-/// searches for the first valid grasp, not for the best or to reproducible ones.
+/// Looks for a valid known grip in `settings`, for up to `within` and on the calling thread only. Serves searches for the first
+/// valid grasp that are not reproducible.
 ///
 /// # Errors
-/// If none was valid in time: how many were tried or excluded. With this in `settings.known.tried`, [`find_grasp`] continues.
+/// The number of grips tried or excluded, if none was valid in time. With this in `settings.known.tried`, [`find_grasp`] continues.
 pub fn find_known_grasp(
     task: Task<'_>,
     settings: &SearchSettings,
@@ -101,7 +110,7 @@ pub fn find_known_grasp(
     if race.try_known_until(Some(clock.now() + within)) {
         return Ok(race.outcome());
     }
-    // A grip that attempts may replace is tried again by the search with those attempts.
+    // The search tries a grip again that its attempts may replace.
     Err(known.tried() - usize::from(race.is_beside_region()))
 }
 
@@ -111,9 +120,8 @@ pub fn find_known_grasp(
 /// Called from a thread of `pool`, that thread is one of the workers; called from elsewhere, it waits.
 ///
 /// A worker checks `stop`, the clock and the others' results at least every 50 µs or so of its own work. With
-/// `settings.run.reproducible`, a search that neither the deadline nor `stop` cuts short has the same outcome
-/// for any number of workers, apart from step times. If it is cut short, it has that grasp or none, never
-/// another one.
+/// `settings.run.reproducible`, the outcome is the same for any number of workers, apart from step times, unless the deadline or
+/// `stop` cuts the search short. Then it has that grasp or none.
 ///
 /// # Panics
 /// If an attempt panics. The other workers stop first, and the pool stays usable.

@@ -1,5 +1,6 @@
-//! Which valid grasps a person would choose. A search for the first valid grasp that finds another one looks for such a grasp a
-//! little longer ([`crate::search::settings::Query::refinement`]). And which attempts of `GUIDED` search wrap handles or hook the fingers.
+//! Preferences among valid grasps: the natural ones, which a person would use, and the attempts of `GUIDED` search that wrap
+//! handles or hook the fingers. After a valid grasp that is not natural, a search goes on a little
+//! ([`crate::search::settings::Query::refinement`]).
 
 use Turn::{Anywhere, Handle, Hook};
 
@@ -16,7 +17,7 @@ use crate::{
     rating::scoring::HELD_BY_HANDLE,
 };
 
-/// Least values of terms without which people would take an object otherwise.
+/// Least values of terms of a natural grasp.
 const MIN_OF_FIRM_HAND: [(Term, f32); 1] = [(Term::Steadiness, 0.3)];
 const MIN_OF_CLOSED_HAND: [(Term, f32); 1] = [(Term::EnoughDigits, 0.65)];
 const MIN_OF_FIRM_GRIP: [(Term, f32); 1] = [(Term::OffSharp, 1.0)];
@@ -39,17 +40,17 @@ const FREE_SHARE: f32 = 0.4;
 /// Pairs of opposed points of a preferred region that are looked at, at most, evenly spread over it.
 const PAIRS_COMPARED: usize = 64;
 
-/// What a person would choose in one scene.
+/// The natural grasps of one scene.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Preference {
-    /// True if the object has a handle that is free: it is then to be held there.
+    /// True if a free handle is to be held.
     pub(super) wants_handle: bool,
-    /// True if the object's owner prefers a region that is free, so much that grasps elsewhere are not chosen.
+    /// True if the object's owner prefers a free region so much that grasps elsewhere are not natural.
     pub(super) wants_region: bool,
 }
 
 impl Preference {
-    /// The preference for an object among barriers. Handles that an owner would not have taken do not count.
+    /// The preference for an object among barriers. Ignores handles where the owner does not want hands.
     pub(super) fn of(object: &PreparedObject, barriers: Barriers<'_>) -> Self {
         let parts = object.parts();
         let is_free = |distance: f32| {
@@ -66,13 +67,13 @@ impl Preference {
         }
     }
 
-    /// True unless the object's owner prefers a region that is free and the contacts of a grasp are elsewhere.
+    /// True unless the contacts are outside a free region that the object's owner prefers.
     pub(super) fn is_where_wanted(self, grasp: &Grasp) -> bool {
         let score = grasp.score.as_ref();
         !self.wants_region || score.is_none_or(|score| suits_owner(&score.regions))
     }
 
-    /// True if a person would choose such a grasp. Hooks are not asked for closed hands, nor to hold what is pushed.
+    /// True if the grasp is natural. Hooks need neither closed hands nor resistance to pushes.
     pub(super) fn is_met_by(self, grasp: &Grasp) -> bool {
         grasp.score.as_ref().is_none_or(|score| {
             reach(&score.values, &MIN_AS_PRESENTED)
@@ -81,7 +82,7 @@ impl Preference {
         })
     }
 
-    /// True if a person would choose such a grip, as far as hand and object alone tell.
+    /// True if the grip is natural, as far as hand and object alone tell.
     pub(super) fn is_met_by_grip(self, values: &Values, classification: Classification, hangs: bool) -> bool {
         classification.is_clear()
             && self.is_firm(values, hangs)
@@ -89,21 +90,20 @@ impl Preference {
             && (hangs || reach(values, &MIN_OF_CLOSED_HAND))
     }
 
-    /// True if a grip holds firmly what people would hold, though they may prefer another hand.
+    /// True if the grip is firm and on the handle, if one is free.
     pub(super) fn is_firm(self, values: &Values, hangs: bool) -> bool {
         reach(values, &MIN_OF_FIRM_GRIP)
             && (hangs || reach(values, &MIN_OF_FIRM_HAND))
             && self.has_handle(values)
     }
 
-    /// True unless a handle is free and the contacts of a grip are off it.
+    /// True unless a handle is free and the contacts are off it.
     fn has_handle(self, values: &Values) -> bool {
         !self.wants_handle || values[Term::OnHandle as usize] >= HELD_BY_HANDLE
     }
 }
 
-/// True if an object has a region that its owner prefers by so much that contacts elsewhere do not suit, and hands have room
-/// there.
+/// True if hands have room in a region that the owner prefers so much that contacts elsewhere do not suit.
 fn is_preferred_region_free(object: &PreparedObject, barriers: Barriers<'_>) -> bool {
     let wanted = &object.wanted_pairs.pairs;
     let compared = wanted
@@ -117,7 +117,7 @@ fn reach(values: &Values, least: &[(Term, f32)]) -> bool {
     least.iter().all(|&(term, least)| values[term as usize] >= least)
 }
 
-/// Mass in kilograms from which a hand wraps what it holds, where it can: pads alone rarely hold more against pushes.
+/// Mass in kilograms from which hands wrap objects where they can: pads alone rarely resist stronger pushes.
 const WRAPPED_MASS: f32 = 0.15;
 
 /// Mass in kilograms from which people carry things by a handle above them, where there is one.
@@ -126,25 +126,25 @@ const CARRIED_MASS: f32 = 1.0;
 /// Mass in kilograms below which handles are never wrapped: a pen is not a tool's handle.
 const PINCHED_MASS: f32 = 0.03;
 
-/// What an attempt does first.
+/// Kind of the first hand of an attempt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {
     /// Places pads or palm anywhere.
     Anywhere,
     /// Wraps a handle.
     Handle,
-    /// Hooks the fingers below what the object may hang by.
+    /// Hooks the fingers below a part that the object may hang by.
     Hook,
 }
 
 /// Whether hands wrap the handles of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HandleUse {
-    /// It has none.
+    /// The object has no handle.
     Impossible,
-    /// They may.
+    /// Hands may wrap one.
     Possible,
-    /// They should: a handle is what sets a part of the object apart, and is free.
+    /// Hands should wrap one: the object has a distinct handle, and that is free.
     Wanted,
 }
 
@@ -159,11 +159,11 @@ const HANDLED: [Turn; 8] = [Handle, Handle, Anywhere, Handle, Handle, Handle, Ha
 const WRAPPED: [Turn; 8] = [Handle, Anywhere, Handle, Handle, Anywhere, Handle, Handle, Hook];
 const CARRIED: [Turn; 8] = [Handle, Hook, Handle, Anywhere, Handle, Hook, Handle, Anywhere];
 const CARRIED_BY_STRAPS: [Turn; 8] = [Hook, Anywhere, Hook, Hook, Hook, Anywhere, Hook, Hook];
-/// The same where nothing but a hook meets the requirements.
+/// The turns if only a hook meets the requirements.
 const HOOKED: [Turn; 8] = [Hook, Hook, Hook, Hook, Hook, Hook, Hook, Anywhere];
 
 impl Turn {
-    /// The turn of an attempt at an object of this mass in kilograms, which may have handles.
+    /// The turn of an attempt at an object of this mass in kilograms.
     pub(super) fn of(attempt: u64, mass: f32, handles: HandleUse, hooks: Hooks) -> Self {
         let has_handles = handles != HandleUse::Impossible;
         let turns = if hooks == Hooks::Demanded {

@@ -1,4 +1,5 @@
-//! The workers of a search and the state that they share.
+//! The workers of a search and the state that they share. Each takes the next attempt, runs it and records a valid grasp, until a
+//! winner is certain.
 
 use std::{
     sync::{
@@ -33,12 +34,12 @@ use crate::{
 /// How long known grips are tried before other workers are woken for fresh attempts.
 const HEAD_START: Duration = Duration::from_micros(300);
 
-/// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose it.
-/// They take a few milliseconds, as long as other searches go on ([`super::settings::Query::refinement`]).
+/// Attempts in which a reproducible search looks for a natural grasp after a valid one that is not. They take a few milliseconds,
+/// as long as other searches go on ([`super::settings::Query::refinement`]).
 pub const REFINING_ATTEMPTS: u64 = 16;
 
-/// How long, and for how many attempts of a reproducible one, a search goes on at least that has only grasps beside a preferred
-/// region which is free. Most find one there in a tenth of it, and then go on as others do.
+/// Least time, or number of attempts of a reproducible search, to look for a grasp in a preferred region that is free. Most
+/// searches find one in a tenth of it.
 const REGION_REFINEMENT: Duration = Duration::from_millis(100);
 const REGION_ATTEMPTS: u64 = 256;
 
@@ -53,18 +54,18 @@ pub(super) struct Race<'a> {
     end: u64,
     /// The next attempt to start. Indices are taken in order, so all below it are taken.
     next: AtomicU64,
-    /// If the search is reproducible, attempts above this index need not run: the lowest valid one so far that a person would
-    /// choose, or the last that may replace another one.
+    /// Attempts of a reproducible search above this index need not run: the lowest attempt with a natural grasp, or the last that
+    /// may replace another grasp.
     bound: AtomicU64,
-    /// When a search that is not reproducible ends, in nanoseconds of its clock, with a grasp that a person would not choose.
+    /// When a search that is not reproducible ends with a grasp that is not natural, in nanoseconds of its clock.
     settles: AtomicU64,
-    /// Set to stop all workers: any grasp will do and one was found, or a worker panicked.
+    /// Stops all workers: the grasp is decided, or a worker panicked.
     over: AtomicBool,
     lowest_interrupted: AtomicU64,
-    /// The attempt that each worker is running, or a lower index; [`IDLE`] before it starts and after it stops.
+    /// The attempt that each worker runs, or a lower index; [`IDLE`] before it starts and after it stops.
     running: Vec<AtomicU64>,
     known: Option<&'a KnownGrips<'a>>,
-    /// Set once the best known grip is valid, but not where the object's owner wants hands that have room there.
+    /// True if the best known grip is valid, but outside a free region that the object's owner prefers.
     is_beside_region: AtomicBool,
     candidates: AtomicU64,
     winners: Mutex<Winners>,
@@ -163,9 +164,9 @@ impl<'a> Race<'a> {
         drop(guard);
     }
 
-    /// Takes the next attempt, unless there is none left or it need not run.
+    /// Takes the next attempt that has to run; `None` if there is none.
     fn take_attempt(&self, worker: usize) -> Option<u64> {
-        // A taken index must run, or not all attempts below a winner would be settled: so check before taking it.
+        // Check before taking: a taken index must run, or attempts below a winner would stay unsettled.
         let open = self.next.load(Ordering::SeqCst);
         if open >= self.end || self.is_over_for(open) {
             return None;
@@ -203,7 +204,7 @@ impl<'a> Race<'a> {
         self.is_beside_region.load(Ordering::Relaxed)
     }
 
-    /// Tries known grips until one is valid or the clock reaches `until`. True if one is valid and no attempt replaces it.
+    /// Tries known grips until one is valid or the clock reaches `until`. True if one is valid and no attempt may replace it.
     pub(super) fn try_known_until(&self, until: Option<Duration>) -> bool {
         let is_late = || until.is_some_and(|until| self.clock.now() >= until);
         let Some((source, grasp)) = self.next_valid(&mut Gripper::default(), is_late) else {
@@ -217,7 +218,7 @@ impl<'a> Race<'a> {
         is_chosen
     }
 
-    /// The next valid one of the known grips, unless the race or the time for them is over.
+    /// The next valid known grip, until time is up or the race is decided.
     fn next_valid(
         &self,
         gripper: &mut Gripper,
@@ -227,8 +228,7 @@ impl<'a> Race<'a> {
             .next_valid(gripper, || self.is_over_for(0) || is_late())
     }
 
-    /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the best grasp is
-    /// wanted.
+    /// Tries known grips while other workers run attempts: on one worker, or on all for the best grasp.
     fn try_known_grips(&self, worker: usize) {
         if self.settings.query.choice == Choice::FirstValid {
             if worker == 0 && !self.is_beside_region() {
@@ -248,7 +248,7 @@ impl<'a> Race<'a> {
         let goes_on = self.show(source, &grasp, value);
         let is_reproducible = self.settings.run.reproducible;
         let (refinement, attempts) = self.refinement_of(&grasp);
-        // A known grip precedes all attempts.
+        // Known grips precede all attempts.
         let first = self.settings.run.first_attempt;
         let next = source.attempt().map_or(first, |index| index.saturating_add(1));
         let winner = Winner {
@@ -282,7 +282,7 @@ impl<'a> Race<'a> {
             }
             (Choice::FirstValid, GraspSource::Attempt(index)) if is_reproducible => {
                 self.bound.fetch_min(index, Ordering::SeqCst);
-                // A known grip precedes every attempt.
+                // Known grips precede all attempts.
                 rival
                     .as_ref()
                     .is_none_or(|lowest| lowest.source.attempt().is_some_and(|lowest| index < lowest))
@@ -297,7 +297,7 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// How long the search goes on after a grasp that a person would not choose, and for how many attempts.
+    /// For how long, and how many attempts, the search continues after a grasp that is not natural.
     fn refinement_of(&self, grasp: &Grasp) -> (Duration, u64) {
         let refinement = self.settings.query.refinement;
         if self.scene.current().is_some() || self.scene.preference().is_where_wanted(grasp) {
@@ -307,8 +307,8 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// True if a search for the first valid grasp need not look for another one: a person would choose it or, after a current
-    /// grasp, it is next to the present hand.
+    /// True if a search for the first valid grasp may end with this one: it is natural or, after a current grasp, next to the
+    /// present hand.
     fn is_met_by(&self, grasp: &Grasp) -> bool {
         self.scene.current().map_or_else(
             || self.scene.preference().is_met_by(grasp),
@@ -316,7 +316,7 @@ impl<'a> Race<'a> {
         )
     }
 
-    /// The quality of an attempt's grasp; after a current grasp, a search for the first valid one prefers the nearest.
+    /// The quality of an attempt's grasp: its score or, when looking for the first to follow a current grasp, its nearness.
     fn value_of(&self, grasp: &Grasp) -> f32 {
         match self.scene.current() {
             Some(current) if self.settings.query.choice == Choice::FirstValid => {
@@ -326,7 +326,7 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Shows a valid grasp to the observer. True if the race goes on even after a preferred grip.
+    /// Shows a valid grasp to the observer. True if the race continues after a preferred grip.
     fn show(&self, source: GraspSource, grasp: &Grasp, value: f32) -> bool {
         let Some(observer) = &self.settings.run.observer else {
             return false;
@@ -344,20 +344,19 @@ impl<'a> Race<'a> {
         observer.goes_on_after_preferred()
     }
 
-    /// True if a grasp that a person would choose is preferred to one just before it.
+    /// True if a natural grasp wins over one found just before it.
     fn has_preferences(&self) -> bool {
         let query = &self.settings.query;
         query.choice == Choice::FirstValid && query.uses_known_grips() && !query.refinement.is_zero()
     }
 
-    /// The highest index such that all attempts up to it have ended and none below it has been beaten by a valid attempt with a
-    /// lower index.
+    /// The highest index such that all attempts up to it have ended, and none below it lost to a valid attempt with a lower index.
     fn last_settled(&self) -> Option<u64> {
         if !self.settings.run.reproducible {
             return Some(u64::MAX);
         }
         let running = self.running.iter().map(|running| running.load(Ordering::SeqCst));
-        // Reads the bound last: a valid attempt lowers it before its worker moves on.
+        // Read the bound last: a valid attempt lowers it before its worker moves on.
         let lowest_running = running.min()?;
         let before = lowest_running.checked_sub(1)?;
         Some(before.min(self.bound.load(Ordering::SeqCst)))
@@ -376,7 +375,7 @@ impl<'a> Race<'a> {
                 Replaceable::UntilTime(settles)
             }
         });
-        // Reproducible: an interrupted attempt with a lower index, or one that replaces the winner, might have won.
+        // In a reproducible search, an interrupted attempt with a lower index, or one that replaces the winner, might have won.
         let last_deciding = match replaceable_until {
             Some(Replaceable::UntilAttempt(last)) => Some(last),
             _ => winner.as_ref().and_then(|winner| winner.source.attempt()),
@@ -398,7 +397,7 @@ impl<'a> Race<'a> {
         };
         let mut report = SearchReport {
             source,
-            // How many others were found by then depends on the number of workers.
+            // The count of other grasps would depend on the number of workers.
             candidates: if is_reproducible {
                 u64::from(source.is_some())
             } else {
@@ -427,25 +426,24 @@ struct Winner {
     source: GraspSource,
     grasp: Box<Grasp>,
     value: f32,
-    /// The last attempt of a reproducible search that replaces it, if a person would choose the grasp of that but not this one.
+    /// The last attempt of a reproducible search whose natural grasp replaces this one, if this one is not natural.
     last_replacing: u64,
 }
 
 /// The valid grasps so far.
 #[derive(Default)]
 struct Winners {
-    /// The best, the first, or the one with the lowest index that a person would choose.
+    /// The best, the first, or the natural one with the lowest index.
     chosen: Option<Winner>,
     others: Vec<Winner>,
 }
 
 impl Winners {
-    /// The winner and, if a person would not choose it, the last attempt of a reproducible search that may replace it, or any
-    /// number.
+    /// The winner and, if it is not natural, the last attempt that may replace it (meaningful only if the search is reproducible).
     fn decided(self, is_reproducible: bool) -> (Option<Winner>, Option<u64>) {
         let Self { chosen, others } = self;
         let last = others.iter().map(|other| other.last_replacing).min();
-        // Beyond the last, attempts may have run that need not have.
+        // Attempts beyond the last need not have run.
         let counts = |winner: &Winner| !is_reproducible || winner.source.attempt() <= last;
         if let Some(chosen) = chosen
             && (last.is_none() || counts(&chosen))

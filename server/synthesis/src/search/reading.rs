@@ -1,5 +1,5 @@
-//! A hand that no search closed, as it is checked: current grasps, which fail by the first check that fails ([`super::current`]), and
-//! clients' own, of which verdicts need all checks ([`super::verdicts`]). Bounds and functions are those of the searches' own checks.
+//! Checks of a hand that no search closed, with the bounds and functions of the search. A current grasp ([`super::current`]) ends
+//! at the first failed check; a client's own hand ([`super::verdicts`]) needs all of them.
 
 use glam::Vec3;
 
@@ -23,11 +23,10 @@ use crate::{
     },
 };
 
-/// By how much, in metres, distances may fall short of their bounds: a grasp that was valid loses so much to single precision on
-/// its way through a client's frame.
+/// Tolerance of distances in metres: a valid grasp loses so much to single precision on its way through a client's frame.
 const ROUNDING: f32 = 5e-6;
 
-/// A figure, its bound, and whether it keeps that.
+/// A measured figure, its bound, and whether it keeps that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Measure {
     pub(super) figure: f32,
@@ -44,16 +43,16 @@ impl Measure {
         }
     }
 
-    /// A distance in metres that must not be less than its bound.
+    /// A distance in metres and its lower bound.
     pub(super) fn at_least(figure: f32, bound: f32) -> Self {
         Self::new(figure, bound, figure >= bound - ROUNDING)
     }
 }
 
-/// The part of a hand that is nearest to a surface.
+/// The part of a hand nearest to a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NearestPart {
-    /// In metres, negative inside.
+    /// Distance in metres, negative inside.
     pub(super) distance: f32,
     pub(super) part: SolidPart,
     /// A point of the surface, in the object's frame.
@@ -69,7 +68,7 @@ pub(super) struct Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    /// A hand in the object's frame; every number of its pose must be finite. `around` must be of the holdout.
+    /// Reads a hand in the object's frame; its pose must be finite. `around` must be of the holdout.
     pub(super) fn new(around: GraspContext<'a>, holdout: &'a Holdout, pose: &'a HandPose) -> Self {
         let solids = HandSolids::of_pose(around.rig, pose);
         Self {
@@ -81,7 +80,7 @@ impl<'a> Reading<'a> {
         }
     }
 
-    /// The deepest part in the object; `None` if no part is in it.
+    /// The deepest part in the object; `None` if no part is inside.
     pub(super) fn deepest(&self, stop: Stop<'_>) -> Result<Option<NearestPart>, Stopped> {
         let surface = &self.around.object.object.surface;
         self.nearest_part(0.0, stop, |solid, least| {
@@ -89,7 +88,7 @@ impl<'a> Reading<'a> {
         })
     }
 
-    /// The part nearest to a forbidden surface; `None` if none is forbidden.
+    /// The part nearest to a forbidden surface; `None` without forbidden surfaces.
     pub(super) fn nearest_forbidden(&self) -> Option<NearestPart> {
         let surface = self.around.object.object.forbidden_surface()?;
         unstopped(|stop| {
@@ -118,7 +117,7 @@ impl<'a> Reading<'a> {
         Ok(nearest)
     }
 
-    /// The receiver's arm; `None` if where the receiver stands is unknown, or if the arm does not reach the wrist.
+    /// The receiver's arm; `None` if the receiver's position is unknown or the arm does not reach the wrist.
     pub(super) fn arm(&self) -> Option<ArmPose> {
         let around = &self.around;
         around
@@ -126,15 +125,15 @@ impl<'a> Reading<'a> {
             .arm_of(around.object.object, around.rig, self.pose.frame_from_wrist)
     }
 
-    /// If the receiver's arm must reach the wrist: the distance from its shoulder and the length of its bones, in metres, and
-    /// whether this arm, from [`Self::arm`], does.
+    /// The distance from the receiver's shoulder to the wrist and the length of the arm, in metres, and whether [`Self::arm`]
+    /// reaches; `None` if no arm has to.
     pub(super) fn reach(&self, arm: Option<&ArmPose>) -> Option<Measure> {
         let receiver = &self.around.presented.receiver;
         let [distance, longest] = receiver.shoulder_distance(self.pose.frame_from_wrist)?;
         Some(Measure::new(distance, longest, self.around.is_reached(arm)))
     }
 
-    /// The distance from the shoulder of the requirements, if they have one.
+    /// The distance from the shoulder that the requirements name.
     pub(super) fn constrained_reach(&self) -> Option<Measure> {
         let wrist = self.pose.frame_from_wrist;
         let reach = self.around.requirements.reach?;
@@ -143,7 +142,7 @@ impl<'a> Reading<'a> {
     }
 }
 
-/// The depth in the object, 0 if no part is in it.
+/// The depth in the object; 0 outside.
 pub(super) fn depth(deepest: Option<&NearestPart>) -> Measure {
     let depth = deepest.map_or(0.0, |deepest| -deepest.distance);
     Measure::new(depth, MAX_PENETRATION, depth <= MAX_PENETRATION + ROUNDING)
@@ -164,7 +163,7 @@ pub(super) struct Held<'a> {
 }
 
 impl Reading<'_> {
-    /// How the hand holds the object, whatever it collides with. Something hangs in it only if the requirements admit that.
+    /// The grip of the hand, whatever it collides with. The object hangs in it only if the requirements admit hooks.
     pub(super) fn held<'b>(&'b self, gripper: &'b mut Gripper) -> Held<'b> {
         let around = &self.around;
         let requirements = around.requirements;
@@ -212,7 +211,7 @@ impl Held<'_> {
         let hold = &self.hold;
         let grip = Grip {
             pose: *self.reading.pose,
-            // Nobody closed it by a ratio.
+            // A posed hand was not closed by a ratio.
             bend_ratios: hold.touching.map(|touches| touches.then_some(1.0)),
             penetration,
             epsilon: hold.epsilon,

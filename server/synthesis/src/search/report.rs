@@ -1,4 +1,4 @@
-//! What a search found and did, who looks on, and the best grasps that differ.
+//! The results of a search: its statistics, its observer, and the best grasps that differ.
 
 use std::{cmp::Ordering, fmt, time::Duration};
 
@@ -18,13 +18,13 @@ use crate::{
     rating::scoring::middle,
 };
 
-/// The failed attempt that came closest to a grasp: the one that failed in the latest step (in the order of [`Rejection::ALL`]);
-/// then by smallest wrench angle; then by lowest index.
+/// The failed attempt that came closest to a grasp: it failed in the latest step (in the order of [`Rejection::ALL`]), then with
+/// the smallest wrench angle, then with the lowest index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NearestMiss {
     /// Why it failed.
     pub rejection: Rejection,
-    /// Its index.
+    /// Index of the attempt.
     pub attempt: u64,
     /// For `NotImmobilizing`: the smallest wrench angle, in radians.
     pub wrench_angle: Option<f32>,
@@ -32,10 +32,9 @@ pub struct NearestMiss {
     pub pose: HandPose,
 }
 
-/// What a search did.
+/// The statistics of a search.
 ///
-/// With `reproducible` and a grasp, it covers the attempts up to the one that found it, whatever else the workers had started:
-/// attempts and prunes are then the same for any number of workers.
+/// If reproducible and successful, they cover the attempts up to the winner only, so they do not depend on the number of workers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SearchReport {
     /// Completed attempts: accepted placements, as the thesis counts.
@@ -48,11 +47,11 @@ pub struct SearchReport {
     pub step_times: Option<StepTimes>,
     /// The closest failed attempt, if none was valid.
     pub nearest_miss: Option<NearestMiss>,
-    /// Where the grasp came from.
+    /// Source of the grasp.
     pub source: Option<GraspSource>,
     /// Number of valid grasps found.
     pub candidates: u64,
-    /// What keeps one hand from holding the object, if no grasp was found; left empty by the search itself, see
+    /// Limits that keep one hand from holding the object, if no grasp was found. Callers fill them in by
     /// [`limits`](super::limits::limits).
     pub limits: Vec<Limit>,
 }
@@ -63,7 +62,7 @@ impl SearchReport {
         self.source.and_then(GraspSource::attempt)
     }
 
-    /// Keeps a failed attempt, if it came closer than those before.
+    /// Keeps a failed attempt if it came closer than those before.
     pub(super) fn note_miss(
         &mut self,
         rejection: Rejection,
@@ -90,8 +89,8 @@ impl SearchReport {
         }
     }
 
-    /// Merges another part of the same search: a worker's share, or a later slice. Keeps the nearer miss of both. Takes the
-    /// source of `part` if its grasp `is_better`.
+    /// Merges another part of the same search: a worker's share, or a later slice. Keeps the nearer miss, and the source of `part`
+    /// if its grasp `is_better`.
     pub fn merge(&mut self, part: Self, is_better: bool) {
         self.attempts += part.attempts;
         self.pruned_placements += part.pruned_placements;
@@ -114,7 +113,7 @@ impl SearchReport {
     }
 }
 
-/// Where a grasp came from, in the order in which sources are tried.
+/// Source of a grasp, in the order in which sources are tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum GraspSource {
     /// A preferred hand, by index.
@@ -149,15 +148,15 @@ impl GraspSource {
     }
 }
 
-/// Sees each valid grasp of a search, from the thread that found it. No lock of the search is held meanwhile, but its work waits.
+/// Sees each valid grasp of a search, on the thread that found it. No lock of the search is held meanwhile, but that worker waits.
 pub trait GraspObserver: fmt::Debug + Send + Sync {
     /// True if the observer wants to have a grasp; cheap, because most are not wanted.
     fn wants(&self, grasp: &Grasp, source: GraspSource, value: f32) -> bool;
 
-    /// Takes a grasp that was wanted, which another one may have overtaken meanwhile.
+    /// Takes a wanted grasp, which another may have overtaken.
     fn keep(&self, found: FoundGrasp);
 
-    /// True if a preferred grip is to be no end of the search for the best.
+    /// True if a search for the best continues after a preferred grip.
     fn goes_on_after_preferred(&self) -> bool;
 }
 
@@ -166,7 +165,7 @@ pub trait GraspObserver: fmt::Debug + Send + Sync {
 pub struct FoundGrasp {
     /// The grasp, with the receiver's arm.
     pub grasp: Box<Grasp>,
-    /// Where it came from.
+    /// Source of the grasp.
     pub source: GraspSource,
     /// Its quality; higher is better.
     pub value: f32,
@@ -175,8 +174,8 @@ pub struct FoundGrasp {
 }
 
 impl FoundGrasp {
-    /// Compares two grasps of one hand, the better one being greater: a preferred grip, then a higher quality, then one known for
-    /// longer. Equal only for the same grasp.
+    /// Compares two grasps of one hand, the better one being greater: a preferred grip, then a higher quality, then the earlier
+    /// source. Equal only for the same grasp.
     pub fn quality(&self, other: &Self) -> Ordering {
         let (this, that) = (self.source, other.source);
         let by_value = self.value.total_cmp(&other.value);
@@ -238,7 +237,7 @@ impl Tally {
     }
 }
 
-/// What grasps differ by.
+/// The features in which alternatives must differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Differences {
     /// The side of the object that the hand comes from, and the hand.
@@ -249,12 +248,12 @@ pub struct Differences {
     pub region: bool,
 }
 
-/// What all grasps of a class have in common, as far as it counts.
+/// The features that the grasps of a class share; `None` for those that do not matter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Class {
     /// The side that the palm faces away from most, 0 to 5 for x, -x, y, -y, z, -z, and the hand.
     pub approach: Option<(u8, Handedness)>,
-    /// The type; the inner none for a grasp without a type.
+    /// The type; the inner `None` for a grasp without a type.
     pub grasp_type: Option<Option<GraspType>>,
     /// The part that is held.
     pub region: Option<Part>,
@@ -263,7 +262,7 @@ pub struct Class {
 /// A part of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// The region with most contacts, by its place; none off all regions.
+    /// The region with most contacts, by its place; `None` off all regions.
     Region(Option<usize>),
     /// Without regions: an eighth of the bounding box. A bit per axis is 1 in its upper half.
     Octant(u8),
@@ -293,8 +292,7 @@ fn part_of(contacts: &[Contact], object: &GraspObject) -> Part {
     Part::Octant(upper.bitmask() as u8)
 }
 
-/// The best grasps of different classes so far. Which they are in the end does not depend on the order in which grasps are
-/// offered.
+/// The best grasps of different classes. The result does not depend on the order in which grasps are offered.
 #[derive(Clone, Debug)]
 pub struct Alternatives {
     most: usize,
@@ -314,7 +312,7 @@ pub struct Alternative {
 }
 
 impl Alternative {
-    /// Orders the better one first; equally good ones of both hands, the right hand's.
+    /// Orders the better alternative first, and of equal ones the right hand's.
     fn order(&self, other: &Self) -> Ordering {
         let hand = |of: &Self| of.handedness == Handedness::Left;
         let by_quality = other.found.quality(&self.found);
@@ -323,7 +321,7 @@ impl Alternative {
 }
 
 impl Alternatives {
-    /// None so far, of at most so many.
+    /// No alternatives yet, and at most so many.
     pub fn new(most: usize) -> Self {
         Self {
             most,
@@ -331,7 +329,7 @@ impl Alternatives {
         }
     }
 
-    /// The quality that any further grasp has to reach; `None` as long as there are less than there may be.
+    /// The quality that a further grasp has to reach; `None` until the list is full.
     pub fn least(&self) -> Option<f32> {
         let is_full = self.best.len() >= self.most;
         self.best
@@ -340,8 +338,8 @@ impl Alternatives {
             .map(|worst| worst.found.value)
     }
 
-    /// Offers a grasp. A class that has made room for better ones comes back with a better grasp: the best of any class among the
-    /// best in the end is better than the worst that is kept when it is offered.
+    /// Offers a grasp. Grasps that were crowded out can be forgotten: the final best of a class is better than the worst grasp
+    /// kept when it is offered.
     pub fn offer(&mut self, new: Alternative) {
         match self.best.iter().position(|kept| kept.class == new.class) {
             Some(place) if new.order(&self.best[place]).is_lt() => {

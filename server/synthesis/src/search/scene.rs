@@ -1,4 +1,4 @@
-//! What all attempts of a search share.
+//! The data that all attempts of a search share, and the hands that `GUIDED` search proposes from it.
 
 use std::sync::{Arc, OnceLock};
 
@@ -36,12 +36,12 @@ use crate::{
     thesis::algorithm_1::ThesisScene,
 };
 
-/// Every how many attempts one is placed next to the present hand of a current grasp, and how far from it, in metres per axis and
-/// radians. More of them find nothing where the giver has moved in.
+/// Every how many attempts one starts next to the present hand of a current grasp, and how far from it, in metres per axis and
+/// radians. More of them find nothing where the giver moved in.
 const NEAR_HAND_EVERY: u64 = 2;
 const NEAR_HAND: [f32; 2] = [0.03, 0.5];
 
-/// What to grasp, and with which hand.
+/// The holdout and the hand that takes the object.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<'a> {
     /// How the object is held out.
@@ -56,8 +56,7 @@ pub struct Task<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guided {
     pub(super) proposal: Proposal,
-    /// Whether it wraps a handle or hooks in: such hands succeed so often, and fail so soon, that others from seeds need not
-    /// follow.
+    /// True if it wraps a handle or hooks in: such hands succeed often and fail soon, so no seeds follow.
     pub(super) is_special: bool,
 }
 
@@ -66,13 +65,13 @@ pub(super) struct Guided {
 pub struct Scene<'a> {
     pub(super) task: Task<'a>,
     pub(super) query: Query,
-    /// Strategy, friction and what Algorithm 1 derives from them.
+    /// Strategy, friction and the data that Algorithm 1 derives from them.
     pub(super) thesis: ThesisScene<'a>,
     object: ObjectScene<'a>,
     presented: Option<Presented>,
     pub(super) seeds: SeedSets,
-    // Computed on first use: cached placements of the receiving hand, where the object may hang in hooked fingers, the
-    // preference among grasps, and where other people's hands were lately.
+    // Computed on first use: cached placements of the receiving hand, places to hook in, the preference among grasps, and the
+    // recent hands of other people.
     placements: OnceLock<Arc<PlacementCache>>,
     hanging_places: OnceLock<HangingPlaces>,
     preference: OnceLock<Preference>,
@@ -114,7 +113,7 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// True if the requirements admit a wrist pose, and the receiver's arm reaches it if it must.
+    /// True if the requirements admit a wrist pose, and the receiver's arm reaches it if it has to.
     pub(super) fn admits_wrist(&self, object_from_wrist: Pose) -> bool {
         let Task { holdout, rig, .. } = self.task;
         let presented = self.presented.as_ref();
@@ -123,7 +122,7 @@ impl<'a> Scene<'a> {
             && presented.is_none_or(|presented| presented.receiver.reaches(rig, object_from_wrist))
     }
 
-    /// Poses the receiver's arm of a grasp, if where the receiver stands can be assumed.
+    /// Poses the receiver's arm of a grasp if the receiver's position is known or assumed.
     pub(super) fn pose_arm(&self, grasp: &mut Grasp) {
         if let Some(presented) = &self.presented
             && grasp.arm.is_none()
@@ -154,7 +153,7 @@ impl<'a> Scene<'a> {
             .map_or(Barriers::NONE, Presented::barriers)
     }
 
-    /// Where `GUIDED` search may place the receiving hand, or the other one.
+    /// The context of `GUIDED` proposals for the receiving hand or the other one.
     pub(super) fn place_of<'b>(&'b self, rig: &'b PreparedRig) -> ProposalContext<'b> {
         let Task { object, .. } = self.task;
         ProposalContext {
@@ -204,7 +203,7 @@ impl<'a> Scene<'a> {
             (_, true) => HandleUse::Wanted,
         };
         let hooks = self.query.requirements.hooks();
-        // Leaves the numbers that other proposals draw from the stream as they are.
+        // Keep the numbers that other proposals draw.
         let own_stream = &mut stream.clone();
         let special = match Turn::of(stream.attempt(), object.mass, handles, hooks) {
             Turn::Anywhere => None,
@@ -231,7 +230,7 @@ impl<'a> Scene<'a> {
         Ok(anywhere(proposal.ok_or(Rejection::NoContacts)?))
     }
 
-    /// A hand next to the present one, in some attempts after a current grasp. Leaves the stream as it is.
+    /// A hand next to the present one, in some attempts after a current grasp. Leaves the stream unchanged.
     fn near_present_hand(&self, stream: &AttemptStream) -> Option<Proposal> {
         let current = self.current()?;
         if !stream.attempt().is_multiple_of(NEAR_HAND_EVERY) {

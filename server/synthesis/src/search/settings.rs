@@ -1,4 +1,4 @@
-//! The settings of a search: the query, what is known, and how to run it.
+//! The settings of a search: the query, prior knowledge, and how to run it.
 
 use std::{sync::Arc, time::Duration};
 
@@ -23,16 +23,16 @@ pub const REFINEMENT: Duration = Duration::from_millis(5);
 /// The settings of a search.
 #[derive(Clone, Debug, Default)]
 pub struct SearchSettings {
-    /// What is asked.
+    /// The requested grasp.
     pub query: Query,
-    /// What is known.
+    /// Prior knowledge.
     pub known: Known,
-    /// How it is run.
+    /// How to run it.
     pub run: Run,
 }
 
 impl SearchSettings {
-    /// The learned grips that the search may use, if there are any.
+    /// The learned grips that the search may use; `None` if there are none.
     pub fn learned(&self) -> Option<&Atlas> {
         let Self { query, known, run } = self;
         let may_use = query.uses_known_grips() && !run.reproducible;
@@ -41,32 +41,32 @@ impl SearchSettings {
     }
 }
 
-/// What is asked of a search. By default: any grasp that is valid under `PHYSICAL`.
+/// The requested grasp. By default, any that is valid under `PHYSICAL`.
 #[derive(Clone, Debug)]
 pub struct Query {
-    /// How hands are placed.
+    /// Placement of hands.
     pub strategy: Strategy,
-    /// Which grasps count as valid.
+    /// Condition for a valid grasp.
     pub validity: Validity,
-    /// Which bend ratios a digit tries.
+    /// Bend ratios that a digit tries.
     pub bend_ratios: BendRatioChoice,
     /// Coefficient of static friction, more than 0; `None` for the object's own.
     pub friction: Option<f32>,
     /// Requirements beyond validity, in the object's frame.
     pub requirements: Requirements,
-    /// Which valid grasp is wanted.
+    /// Choice among valid grasps.
     pub choice: Choice,
-    /// How much longer a search for the first valid grasp looks for one that a person would rather choose, if the first is not
-    /// such (it then has the highest score of those found); reproducible searches count attempts instead
-    /// ([`super::REFINING_ATTEMPTS`]). 0: the first is the answer. Known grips are not searched further.
+    /// How much longer a search for the first valid grasp looks for a natural one after it found another; without one, the
+    /// highest score wins. Reproducible searches count attempts instead ([`super::REFINING_ATTEMPTS`]). At 0, the first grasp is
+    /// the answer. Known grips are not searched further.
     pub refinement: Duration,
     /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
     pub other_hand: Option<PreparedRig>,
-    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::current::settle`]
-    /// decides about it. A search for the first valid grasp then prefers grasps near the present hand, and places some there.
+    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`; [`super::current::settle`] decides
+    /// about it. A search for the first valid grasp then starts some attempts near the present hand and prefers near grasps.
     pub current: Option<CurrentGrasp>,
-    /// Where other people's hands were in the last second, the latest last, in the object's frame: a grasp that follows the
-    /// current one keeps clear of them there too, if any does.
+    /// Other people's hands over the last second, the latest last, in the object's frame. A grasp that follows the current one
+    /// keeps clear of all of them if possible.
     pub recent_hands: Arc<[Arc<HandJoints>]>,
 }
 
@@ -88,7 +88,7 @@ impl Default for Query {
 }
 
 impl Query {
-    /// True if known grips, which are of one hand, may answer it.
+    /// True if known grips may answer the query; they are of one hand.
     pub fn uses_known_grips(&self) -> bool {
         self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
     }
@@ -114,19 +114,19 @@ impl Query {
     }
 }
 
-/// What is known of the object and rig before the search. By default nothing.
+/// Data about object and rig known before the search. By default none.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
     /// Grips to try first, if [`Query::uses_known_grips`].
     pub atlas: Option<Arc<Atlas>>,
-    /// Grips that earlier searches found, under the object's own friction. They are tried after those of the atlas; reproducible
-    /// searches ignore them.
+    /// Grips that earlier searches found, under the object's own friction; tried after the atlas. Reproducible searches ignore
+    /// them.
     pub learned: Option<Arc<Atlas>>,
-    /// Where attempts take seeds from if no known grip is valid; likewise.
+    /// The source of seeds for attempts if no known grip is valid; ignored where `atlas` is.
     pub seeds: SeedSource,
-    /// Hands in the object's frame that are tried before all other known grips, likewise.
+    /// Hands in the object's frame to try before all other known grips; ignored where `atlas` is.
     pub preferred: Arc<[HandPose]>,
-    /// Number of known grips to skip, from [`super::find_known_grasp`] for the same ones.
+    /// Number of known grips to skip, as returned by [`super::find_known_grasp`].
     pub tried: usize,
 }
 
@@ -143,8 +143,8 @@ impl Known {
 pub struct Run {
     /// Seed of all attempts' random streams.
     pub seed: u64,
-    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index (under `PHYSICAL`, the
-    /// first with a clear type of those soon after it, if it has none), instead of the first to finish.
+    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index, replaced by a natural
+    /// grasp soon after it, instead of the first to finish.
     pub reproducible: bool,
     /// The lowest attempt index.
     pub first_attempt: u64,

@@ -1,4 +1,4 @@
-//! Verdicts about a hand that somebody posed: every check of `PHYSICAL` validity with its figure, in words.
+//! Verdicts about a hand that a client posed: every check of `PHYSICAL` validity with its figure, in words.
 
 use std::fmt::{self, Write as _};
 
@@ -27,7 +27,7 @@ use crate::{
     },
 };
 
-/// What a part of the hand is measured against.
+/// The counterpart of a measured part of the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Against {
     /// Another hand or an obstacle.
@@ -50,23 +50,23 @@ impl fmt::Display for Against {
 pub struct Verdict {
     /// The check.
     pub check: Check,
-    /// True if it is passed.
+    /// True if the hand passes it.
     pub passed: bool,
     /// The figure, in the unit of the check; `None` if there is nothing to measure.
     pub figure: Option<f32>,
     /// The least or the largest figure that passes.
     pub bound: Option<f32>,
-    /// Where it is measured, in the object's frame.
+    /// Place of the measurement, in the object's frame.
     pub at: Option<Vec3>,
     /// The part of the hand that is measured.
     pub part: Option<SolidPart>,
-    /// What that part is measured against, unless it is the object.
+    /// The counterpart of that part, unless it is the object.
     pub against: Option<Against>,
-    /// All of it in words, in SI units.
+    /// The verdict in words, in SI units.
     pub description: String,
 }
 
-/// What was found about a hand.
+/// The verdicts on a hand.
 #[derive(Clone, Debug)]
 pub struct Judgement {
     /// One verdict per check, in the order of [`Check::OF_HAND`].
@@ -76,7 +76,7 @@ pub struct Judgement {
 }
 
 impl Judgement {
-    /// True if every check is passed.
+    /// True if the hand passes every check.
     pub fn is_valid(&self) -> bool {
         self.verdicts.iter().all(|verdict| verdict.passed)
     }
@@ -134,7 +134,7 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
     Ok(judgement)
 }
 
-/// How far an angle may be beyond its limits, in radians: room for the rounding of clients that count in degrees.
+/// Tolerance of angles in radians, for the rounding of clients that count in degrees.
 const ANGLE_SLACK: f32 = 1e-3;
 
 impl Verdict {
@@ -205,7 +205,7 @@ fn forbidden(nearest: Option<NearestPart>) -> Verdict {
     Verdict::measured(Check::Forbidden, measure, description).of(part, at, None)
 }
 
-/// Whether the arm reaches the wrist, and the requirements let it. The figure is how much too long the way from the shoulder is.
+/// Whether the arm reaches the wrist and the requirements admit it. The figure is the excess of the distance from the shoulder.
 fn reach(reading: &Reading<'_>, arm: Option<Measure>) -> Verdict {
     let constrained = reading.constrained_reach();
     let is_failed = |reach: &Measure| !reach.passed;
@@ -338,8 +338,7 @@ fn requirements(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
     Verdict::new(Check::Requirements, unmet.is_empty(), description)
 }
 
-/// The largest excess of the hand's angles: searches keep the limits as they bend digits, and requests with current grasps are
-/// refused.
+/// The largest excess of the hand's angles; searches keep the limits, and requests with such current grasps are refused.
 fn joint_limits(rig: &Rig, pose: &HandPose, solids: &HandSolids) -> Verdict {
     let digits = Digit::ALL.into_iter().filter(|&digit| rig.has(digit));
     let angles = digits.flat_map(|digit| {
@@ -372,7 +371,7 @@ fn joint_limits(rig: &Rig, pose: &HandPose, solids: &HandSolids) -> Verdict {
     Verdict::measured(Check::JointLimits, measure, description).of(part, at, None)
 }
 
-/// Where a part is by its distance from something, in metres.
+/// Describes a part's distance from something, in metres.
 fn place(distance: f32, inside: &str) -> String {
     if distance < 0.0 {
         format!("{} {inside}", millimetres(-distance))

@@ -27,8 +27,8 @@ const SIDE: [f32; 2] = [0.5, 0.87];
 /// normal. Smaller values count more pad contacts as tip contacts.
 const TIP: [f32; 2] = [0.26, 0.43];
 
-/// Negative cosine between two presses over which they become opposed: 90° to 120° apart, the latter as around a rod held by
-/// three digits. Larger values require more exactly opposite presses.
+/// Negative cosine between two presses over which they become opposed: 90° to 120° apart; 120° as around a rod held by three
+/// digits. Larger values require more exactly opposite presses.
 const OPPOSED: [f32; 2] = [0.0, 0.5];
 
 /// Minimum negative cosine between two pushes for their distance to count as a thickness: 105° apart.
@@ -44,7 +44,7 @@ const PART_WEIGHT: f32 = 0.1;
 /// [`Finger::inner`] if the second link touches but the third does not. A larger one classifies more grasps as power grasps.
 const SECOND_LINK_ALONE: f32 = 0.7;
 
-/// [`Finger::inner`] if the second and third link touch: the second often merely rests on what the tip holds.
+/// [`Finger::inner`] if the second and third link touch: the second often merely rests on an object that the tip holds.
 const SECOND_AND_THIRD_LINK: f32 = 0.35;
 
 /// A contact of a link or the palm.
@@ -63,7 +63,7 @@ pub(super) struct Touch {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Finger {
     pub(super) touches: bool,
-    /// How far it holds with more than its last link, 0 to 1.
+    /// Degree to which it holds with more than its last link, 0 to 1.
     pub(super) inner: f32,
     pub(super) position: Vec3,
     /// Mean direction of its links' pushes, a unit vector or zero.

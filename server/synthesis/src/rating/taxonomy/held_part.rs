@@ -36,12 +36,12 @@ pub(super) struct HeldPart {
     pub(super) compact: f32,
     /// Its smallest extent, in hand lengths: the thickness of a sheet.
     pub(super) thickness: f32,
-    /// How well a sphere fits: [`crate::geometry::local_shape::Part::sphericity`].
+    /// Fit of a sphere: [`crate::geometry::local_shape::Part::sphericity`].
     pub(super) sphericity: f32,
     /// How alike it is on all sides around the palm's normal, 0 to 1: 1 for a disk or jar that the palm faces, near 0 for a can
-    /// that lies across the hand and for what is long.
+    /// across the hand or anything long.
     pub(super) all_around: f32,
-    /// How it curves under the contacts; flat if `thin` is below [`EVEN_SECTION`], where nobody asks.
+    /// Curvature under the contacts; flat if `thin` is below [`EVEN_SECTION`], where it does not matter.
     pub(super) curvature: Curvature,
 }
 
@@ -62,7 +62,7 @@ impl HeldPart {
         };
         let [largest, middle, smallest] = part.spreads.map(|spread| spread.max(f32::MIN_POSITIVE));
         let thin = smallest / middle;
-        // Only what is as thick as wide can be a ball, so most parts need no closer look.
+        // Only a part as thick as wide can be a ball, so most need no closer look.
         let curvature = if thin > EVEN_SECTION[0] {
             let touched = contacts.iter().map(|contact| SurfaceSample {
                 position: contact.position,
@@ -90,7 +90,7 @@ impl HeldPart {
     }
 }
 
-/// The point halfway between what the fingers touch and what thumb and palm do; `None` without a contact.
+/// The point halfway between the contacts of the fingers and those of thumb and palm; `None` without a contact.
 fn middle(contacts: &[Contact]) -> Option<Vec3> {
     let mean = |of_fingers: bool| {
         let (mut sum, mut count) = (Vec3::ZERO, 0.0);
@@ -149,11 +149,11 @@ const ROUND: [f32; 2] = [0.25, 0.7];
 /// Sphericity over which a held part becomes a ball: 0.6 for a cube, 0.75 for a can as high as wide, over 0.9 for an apple.
 const BALL: [f32; 2] = [0.76, 0.92];
 
-/// What convergent fingers add to the sphericity: whoever takes something roundish by its round side takes it as a ball.
+/// Sphericity that convergent fingers add: a roundish object taken by its round side is taken as a ball.
 const TAKEN_AS_BALL: f32 = 0.1;
 
-/// [`Curvature::roundness`](crate::geometry::local_shape::Curvature::roundness) over which what is touched becomes round: more
-/// than a square rod.
+/// [`Curvature::roundness`](crate::geometry::local_shape::Curvature::roundness) over which a touched part becomes round: more than
+/// a square rod.
 const ROUND_SECTION: [f32; 2] = [0.7, 0.85];
 
 /// [`Curvature::along`](crate::geometry::local_shape::Curvature::along) over which a round part bulges like a ball or the bowl of
@@ -172,7 +172,7 @@ const NO_LONGER_PRISM: [f32; 2] = [0.3, 1.0];
 /// something that bulges as a ball.
 const COMPACT_IN_FIST: [f32; 2] = [0.5, 0.75];
 
-/// [`HeldPart::all_around`](super::held_part::HeldPart::all_around) over which what the palm faces becomes a disk.
+/// [`HeldPart::all_around`](super::held_part::HeldPart::all_around) over which a part that the palm faces becomes a disk.
 const ALL_AROUND: [f32; 2] = [0.3, 0.6];
 
 /// Thickness in hand lengths over which a sheet becomes a disk with a rim: 3 to 7 mm on an adult's hand.
@@ -192,7 +192,7 @@ const COMPACT: [f32; 2] = [0.4, 0.65];
 /// fist, a card like a pen, a bar like a plate, a wide box in a pinch.
 const OTHER_SHAPE: f32 = 0.6;
 
-/// How well what is held fits, 0 to 1.
+/// Fit of the held part to each shape, 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShapeFits {
     pub(super) ball: f32,

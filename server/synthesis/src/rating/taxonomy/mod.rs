@@ -68,10 +68,10 @@ const AROUND: [f32; 2] = [15.0, 45.0];
 const POWER: [f32; 2] = [0.3, 0.7];
 
 /// Fit of fingertips if more than the tips holds something for which the taxonomy shows no power type with these fingers: two or
-/// three on what is no ball, one on a ball.
+/// three on anything but a ball, one on a ball.
 const MORE_THAN_TIPS: f32 = 0.6;
 
-/// How far a finger's side counts as its pad on what cannot be held against a side: a ball, or something wide.
+/// How far a finger's side counts as its pad on an object that cannot be held against a side: a ball, or something wide.
 const SIDE_AS_PAD: f32 = 0.7;
 
 /// Discount on side opposition if a pad of the same finger touches too.
@@ -274,7 +274,7 @@ impl<'a> View<'a> {
     reason = "palm and thumb oppositions are grouped separately"
 )]
 fn virtual_finger(touching: u8, cell: Cell) -> f32 {
-    // Lowest bit first: index, middle, ring, little finger, so literals read from little to index finger.
+    // Lowest bit first: index, middle, ring, little finger. Literals read from little to index finger.
     match (cell.opposition, cell.virtual_finger, touching) {
         (_, VirtualFinger::TwoToFive, 0b1111)
         | (Opposition::Palm, VirtualFinger::ThreeToFive, 0b1110 | 0b1111)

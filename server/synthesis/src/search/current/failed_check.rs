@@ -1,4 +1,5 @@
-//! Why a current grasp is not kept, and preferred ones are not answered, with the figure that decides; and why there is no other.
+//! Reasons, with the deciding figure: why a current grasp is not kept, why a preferred hand is passed over, and why no grasp was
+//! found.
 
 use std::fmt;
 
@@ -29,12 +30,12 @@ use crate::{
 /// [`crate::geometry::mesh_bvh::MeshBvh::closest_to_capsule`].
 const GAP_SLACK: f32 = 2e-5;
 
-/// Why a current grasp is not kept, and by how much.
+/// The check that a current grasp failed, and by how much.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FailedCheck {
     /// The check.
     pub check: Check,
-    /// The figure that decided, in the unit of the check.
+    /// The deciding figure, in the unit of the check.
     pub figure: Option<f32>,
     /// The bound that it violates, in the same unit.
     pub bound: Option<f32>,
@@ -58,7 +59,7 @@ impl FailedCheck {
     }
 }
 
-/// The grasp of a hand as it is, which may be closer to other people's hands by `grace` metres.
+/// The grasp of an unchanged hand, which may be closer to other people's hands by `grace` metres.
 pub(in crate::search) fn held(
     reading: &Reading<'_>,
     grace: f32,
@@ -162,8 +163,8 @@ fn holds(check: Check, passed: bool) -> Result<(), FailedCheck> {
     passed.then_some(()).ok_or_else(|| FailedCheck::new(check))
 }
 
-/// The first `count` preferred hands of the settings that are not valid, by their places, and why: the first check that each
-/// fails with its digits closed or opened as little as it takes to touch. Takes some tens of microseconds for each.
+/// The places of the invalid hands among the first `count` preferred ones, each with the first check that it fails once its digits
+/// just touch. Takes some tens of microseconds per hand.
 pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> Vec<(usize, FailedCheck)> {
     let Task { holdout, rig, .. } = task;
     let query = &settings.query;
@@ -186,8 +187,8 @@ pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> V
         .collect()
 }
 
-/// Why no grasp was found: [`Check::GiverClearance`], [`Check::Holdable`], [`Check::Reach`] or [`Check::Time`], by what limits
-/// the holdout or, without a limit, by what most known grips fail that would hold.
+/// Why no grasp was found: [`Check::GiverClearance`], [`Check::Holdable`], [`Check::Reach`] or [`Check::Time`], by the limits of
+/// the holdout or, without a limit, by the check that most grips fail of those that would hold.
 pub fn no_grasp_reason(scene: &Scene<'_>, settings: &SearchSettings, limits: &[Limit]) -> Check {
     let is_limited_by = |check: Check| limits.iter().any(|limit| limit.check == check);
     let unholdable = [Check::Mass, Check::Torque, Check::Width, Check::Forbidden];
@@ -264,7 +265,7 @@ impl fmt::Display for FailedCheck {
             Check::Banned => "the hand is near a forbidden grip".to_owned(),
             Check::Digits => "the requirements do not admit the digits that touch".to_owned(),
             Check::Closure => {
-                // A share of nothing is none.
+                // A share of no closure is 0.
                 let share = if figure > 0.0 {
                     (figure / bound).min(1.0)
                 } else {

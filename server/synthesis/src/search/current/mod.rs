@@ -1,11 +1,12 @@
 //! The current grasp: the hand that a character holds on to from one request to the next.
 //!
-//! Between two requests, giver and object have moved a little. A current hand is the answer as it is while it passes every check
-//! of `PHYSICAL` validity ([`CurrentGraspStatus::Kept`]), or with some digits out of the way ([`evasion`]). Otherwise the nearest
-//! of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`). A committed hand is
-//! never replaced: it withdraws.
+//! Between two requests, giver and object have moved a little. The answer is the first of these that is valid:
 //!
-//! [`evasion`]: crate::physical::closer
+//! 1. The current grasp as it is, by every check of `PHYSICAL` validity ([`CurrentGraspStatus::Kept`]).
+//! 2. The current grasp with digits moved away from a barrier ([`closer`](crate::physical::closer)).
+//! 3. The nearest known grip (`replan`), or else the nearest grasp that attempts find (`nearness`).
+//!
+//! A committed hand is never replaced: it withdraws.
 
 mod failed_check;
 mod replan;
@@ -35,41 +36,41 @@ pub use way::{HandWay, METRES_PER_RADIAN};
 
 pub(super) use way::RecentHands;
 
-/// Longest way, in metres as [`HandWay::length`] counts it, of a grasp that an attempt found and that is near enough for the
-/// search to end with it: a small correction of the hand. A longer one ends more searches early, with jumps.
+/// Longest way of a grasp that ends the search, as [`HandWay::length`] counts it: a small correction of the hand. More ends more
+/// searches early, with jumps.
 const AT_HAND: f32 = 0.05;
 
 /// A grasp to hold on to. Everything is in the object's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentGrasp {
-    /// Its hand.
+    /// Hand of the grasp.
     pub hand: HandPose,
-    /// Where the receiver's hand is now, from where ways are measured.
+    /// The receiver's present hand, from where ways are measured.
     pub present: HandPose,
-    /// How much higher the score of a known grip must be to replace it while it is valid; none: nothing does.
+    /// How much higher a known grip must score to replace a valid current grasp; `None` if nothing replaces it.
     pub min_score_gain: Option<f32>,
-    /// Whether the hand is closing, so that nothing replaces it.
+    /// True if the hand is closing, so that nothing replaces it.
     pub is_committed: bool,
-    /// When it is the answer although it is too close to other people's hands.
+    /// How much too close to other people's hands it may be.
     pub grace: Grace,
 }
 
-/// How much closer to other people's hands a current grasp may be than a valid one, in metres: hands are tracked with noise, and
-/// now and then not at all.
+/// How much closer to other people's hands a current grasp may be than a valid one, in metres: hand tracking is noisy and drops
+/// out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Grace {
     /// In any case.
     pub always: f32,
-    /// If no known grip could follow it that keeps clear of where those hands were lately, unless it is committed.
+    /// If no known grip can follow it that keeps clear of the recent hands, unless it is committed.
     pub alone: f32,
 }
 
-/// What became of a current grasp.
+/// Outcome for a current grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CurrentGraspStatus {
     /// It is the answer.
     Kept,
-    /// It is the answer with digits moved that it can do without.
+    /// It is the answer with some digits moved that it does not need.
     Adjusted,
     /// Another grasp is the answer.
     Replanned,
@@ -79,12 +80,12 @@ pub enum CurrentGraspStatus {
     Aborted,
 }
 
-/// What became of a current grasp, and how far the answer is from it.
+/// Outcome for a current grasp, and how far the answer is from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentGraspVerdict {
-    /// What became of it.
+    /// The outcome.
     pub status: CurrentGraspStatus,
-    /// Why it was not kept as it is, or why it is kept by its grace only.
+    /// Why it was not kept as it is, or is kept by its grace only.
     pub failed_check: Option<FailedCheck>,
     /// Why there is no grasp.
     pub no_grasp: Option<Check>,
@@ -92,7 +93,7 @@ pub struct CurrentGraspVerdict {
     pub moved: [bool; 5],
     /// The way from the present hand to the answer.
     pub way: Option<HandWay>,
-    /// Where an aborted hand withdraws to.
+    /// Pose to which an aborted hand withdraws.
     pub withdrawal: Option<HandPose>,
 }
 
@@ -108,8 +109,7 @@ impl CurrentGraspVerdict {
         }
     }
 
-    /// The verdict on a grasp that is not kept, after a search with the same scene. Without a way if the answer is of another
-    /// hand.
+    /// The verdict on a grasp that is not kept, after a search with the same scene. Without a way if the answer is of another hand.
     pub fn after_search(
         scene: &Scene<'_>,
         failed: Option<FailedCheck>,
@@ -140,7 +140,7 @@ pub enum Settlement {
     Stopped,
 }
 
-/// How near a grasp is to the present hand: more than any score, and higher the nearer.
+/// The nearness of a grasp to the present hand, more than any score.
 pub(super) fn nearness(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
     1.0 + (1.0 + way_of(scene, current, grasp)).recip()
 }
@@ -159,9 +159,8 @@ fn way_of(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
     way::WristWay::between(present, to).length() + lack
 }
 
-/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop`
-/// says so. The same scene must have been prepared with the same settings. `None` without a current grasp or without `PHYSICAL`
-/// validity.
+/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop`. The
+/// scene must have been prepared with the same settings. `None` without a current grasp or `PHYSICAL` validity.
 pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Option<Settlement> {
     let current = scene.current()?;
     let around = scene.surroundings()?;
@@ -172,7 +171,7 @@ pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> O
 fn decide(replanner: &Replanner<'_>, stop: Stop<'_>) -> Result<Settlement, Stopped> {
     let Replanner { around, current, .. } = *replanner;
     let mut gripper = Gripper::default();
-    // What is known of a grip need not be found again.
+    // A known grip has stored data that need not be found again.
     let kept = match replanner.of_known_hand(&current.hand, &mut gripper) {
         Some(grasp) => Ok((grasp, CurrentGraspVerdict::new(CurrentGraspStatus::Kept, None))),
         None => kept(replanner, &mut gripper),
@@ -222,7 +221,7 @@ fn decide(replanner: &Replanner<'_>, stop: Stop<'_>) -> Result<Settlement, Stopp
     Ok(replanner.settled(kept, verdict))
 }
 
-/// The current grasp as it is, by its grace, or with digits moved that are too close to a barrier.
+/// The unchanged current grasp, the one kept by its grace, or the one with digits moved off a barrier.
 fn kept(replanner: &Replanner<'_>, gripper: &mut Gripper) -> Result<Kept, FailedCheck> {
     let Replanner { around, current, .. } = *replanner;
     let new = CurrentGraspVerdict::new;
@@ -248,8 +247,8 @@ fn kept(replanner: &Replanner<'_>, gripper: &mut Gripper) -> Result<Kept, Failed
     Err(failed)
 }
 
-/// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to
-/// touch, or the known grip that would follow it as a current grasp. `None` if neither is valid, or once `stop` says so.
+/// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with its digits just touching, or the known grip that would
+/// follow it as a current grasp. `None` if neither is valid, or once stopped.
 pub fn nearest_grasp(
     task: Task<'_>,
     settings: &SearchSettings,

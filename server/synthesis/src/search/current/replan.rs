@@ -1,4 +1,4 @@
-//! Known grips near the present hand, or better than a current grasp.
+//! Known grips that may follow a current grasp: near the present hand, or better.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -25,19 +25,19 @@ use crate::{
     },
 };
 
-/// How much farther than the nearest valid grip another one may be that costs less altogether.
+/// A grip may be so many times as far as the nearest valid one if it costs less.
 const NEARLY_NEAREST: f32 = 1.25;
 
-/// Most valid grips that are compared, at some 10 µs each.
+/// Most valid grips compared, at some 10 µs each.
 const MAX_COMPARED: usize = 16;
 
-/// Most valid grips that are compared if all of them are where another hand was lately.
+/// Most valid grips compared if all of them lack clearance from the recent hands.
 const MAX_UNSTEADY: usize = 64;
 
-/// Way of wrist and fingertips up to which two hands are the same but for rounding, in metres.
+/// Way of wrist and fingertips, in metres, up to which two hands are the same but for rounding.
 const SAME: f32 = 1e-5;
 
-/// Distance of two forearms' directions up to which hands may be the same: [`SAME`] in a radian's metres, and rounding.
+/// Distance of two forearms' directions up to which hands may be the same: [`SAME`] as an angle, and rounding.
 const ALIKE: f32 = 2.0 * SAME / METRES_PER_RADIAN;
 
 /// How much higher than estimated a score may be: gravity is up to 18° from the direction that an entry was rated under.
@@ -51,7 +51,7 @@ pub(super) type Kept = (Box<Grasp>, CurrentGraspVerdict);
 pub(super) struct Known {
     pub(super) source: GraspSource,
     pub(super) grasp: Box<Grasp>,
-    /// How far it is short of keeping clear of where other hands were lately, as a way in metres.
+    /// The clearance that it lacks from other people's recent hands, as a way in metres.
     pub(super) lack: f32,
 }
 
@@ -84,8 +84,8 @@ impl<'a> Replanner<'a> {
         }
     }
 
-    /// The valid grip to follow a failed grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
-    /// the one that costs least; without any, a learned one, likewise.
+    /// The valid grip to follow a failed grasp: a preferred one, or else the cheapest of those in the atlas that are about as near
+    /// as the nearest, or else such a learned one.
     pub(super) fn nearest(&self, gripper: &mut Gripper, stop: Stop<'_>) -> Result<Option<Known>, Stopped> {
         if let Some(preferred) = self.preferred(gripper, stop)? {
             return Ok(Some(preferred));
@@ -104,8 +104,7 @@ impl<'a> Replanner<'a> {
         Ok(None)
     }
 
-    /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; `None` if none is
-    /// valid.
+    /// The cheapest of the valid grips that are about as near as the nearest; `None` if none is valid.
     fn nearest_of(
         &self,
         grips: &Grips,
@@ -115,7 +114,7 @@ impl<'a> Replanner<'a> {
     ) -> Result<Option<Known>, Stopped> {
         let mut by_way: BinaryHeap<Reverse<(u32, u16)>> = (0..)
             .zip(grips.entries())
-            // Bits of positive numbers have their order.
+            // The bits of positive floats have their order.
             .map(|(index, entry)| Reverse((self.way_to(entry).to_bits(), index)))
             .collect();
         let mut farthest = f32::INFINITY;
@@ -183,7 +182,7 @@ impl<'a> Replanner<'a> {
         Ok(None)
     }
 
-    /// The grasp of a hand that is a known grip, if that is valid here.
+    /// The grasp of a hand that is a known grip, if valid here.
     pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let of_atlas = self.atlas.map(Atlas::grips);
         let of_learned = self.learned.map(Atlas::grips);
@@ -209,7 +208,7 @@ impl<'a> Replanner<'a> {
         u16::try_from(alike.find(|&place| is_same(&grips.entries()[place]))?).ok()
     }
 
-    /// The valid grip of the atlas with the highest score, if that is at least `least`.
+    /// The valid grip of the atlas with the highest score, if at least `least`.
     pub(super) fn best(
         &self,
         least: f32,
@@ -246,7 +245,7 @@ impl<'a> Replanner<'a> {
         Ok(best)
     }
 
-    /// An upper bound of the score that a grip has here, as far as its stored scores tell.
+    /// An upper bound of a grip's score here, by its stored scores.
     fn score_bound(&self, atlas: &Atlas, index: u16, entry: &Entry) -> f32 {
         let (object, presented) = (self.around.object, self.around.presented);
         let own_friction = object.object.friction_under(Validity::Physical);
@@ -267,7 +266,7 @@ impl<'a> Replanner<'a> {
         WristWay::between(present, entry.grip.pose.frame_from_wrist).length()
     }
 
-    /// The grasp of a known grip, if it is valid here, and how far it is short of where other hands were lately.
+    /// The grasp of a known grip, if valid here, and the clearance that it lacks from the recent hands.
     fn check(&self, grips: &Grips, index: u16, gripper: &mut Gripper) -> Option<(Box<Grasp>, f32)> {
         let place = usize::from(index);
         let barriers = self.around.presented.barriers();
@@ -277,7 +276,7 @@ impl<'a> Replanner<'a> {
         Some((grasp, recent.map_or(0.0, |recent| recent.lack(&solids))))
     }
 
-    /// The grasp of a hand as it is, which may be closer to other people's hands by `grace` metres.
+    /// The grasp of an unchanged hand, which may be closer to other people's hands by `grace` metres.
     pub(super) fn hold(
         &self,
         pose: &HandPose,
@@ -298,7 +297,7 @@ impl<'a> Replanner<'a> {
         Some((grasp, verdict))
     }
 
-    /// The answer with a grasp of the same hand, under a verdict that lacks the way.
+    /// The answer with a grasp of the same hand, its way filled in.
     pub(super) fn settled(&self, known: Known, verdict: CurrentGraspVerdict) -> Settlement {
         let way = HandWay::between(self.scene, &self.current.present, &known.grasp.pose);
         let verdict = CurrentGraspVerdict {

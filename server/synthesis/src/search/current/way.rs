@@ -1,4 +1,4 @@
-//! How far a hand has to go from where it is to a grasp.
+//! The way of a hand from its present pose to a grasp, and its cost.
 
 use std::sync::Arc;
 
@@ -23,28 +23,28 @@ use crate::{
     search::scene::Scene,
 };
 
-/// What a turn by one radian counts as, in metres: the points of a hand are 10 cm from its wrist on average. More prefers grasps
-/// that are farther away in the same attitude.
+/// Cost of a turn by one radian, in metres: the points of a hand are 10 cm from its wrist on average. More prefers grasps that are
+/// farther away in the same attitude.
 pub const METRES_PER_RADIAN: f32 = 0.1;
 
-/// Parts that the straight way is looked at in; its ends are not looked at. More notice thinner obstacles, and take 5 µs each.
+/// Points at which the straight way is checked, its ends excluded. More notice thinner obstacles, and take 5 µs each.
 const PARTS: u16 = 6;
 
-/// What the way of the fingertips counts as, relative to the wrist's: it is short, and part of closing the hand anyway.
+/// Weight of the fingertips' way relative to the wrist's: it is short, and part of closing the hand anyway.
 const FINGERTIPS: f32 = 0.5;
 
-/// What a way that is not free counts as in addition, in metres: about the detour.
+/// Extra cost of a blocked way, in metres: about the detour.
 const DETOUR: f32 = 0.05;
 
-/// What a whole point of the score counts as, in metres. Scores of valid grasps differ by some tenths.
+/// Cost of a whole point of the score, in metres. Scores of valid grasps differ by some tenths.
 const SCORE: f32 = 0.1;
 
-/// How far a wrist has to go.
+/// The way of a wrist.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WristWay {
-    /// In metres.
+    /// Distance in metres.
     pub(super) distance: f32,
-    /// In radians.
+    /// Angle in radians.
     pub(super) angle: f32,
 }
 
@@ -64,7 +64,7 @@ impl WristWay {
     }
 }
 
-/// How far a hand has to go.
+/// The way of a hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandWay {
     /// Distance of the wrists, in metres.
@@ -73,7 +73,7 @@ pub struct HandWay {
     pub angle: f32,
     /// Mean distance that the fingertips move in the wrist's frame, in metres.
     pub fingertips: f32,
-    /// Whether the straight way is clear of barriers, and palm and forearm do not pass through the object.
+    /// True if the straight way is clear of barriers, and palm and forearm do not pass through the object.
     pub is_free: bool,
 }
 
@@ -98,7 +98,7 @@ impl HandWay {
     }
 }
 
-/// What a way to a grasp costs, in metres, if it is free.
+/// Cost of the way to a grasp if it is free, in metres.
 pub(super) fn cost_if_free(rig: &Rig, from: &HandPose, to: &Grasp, score: f32) -> f32 {
     WristWay::between(from.frame_from_wrist, to.pose.frame_from_wrist).length()
         + FINGERTIPS * fingertips(rig, from, &to.pose)
@@ -137,7 +137,7 @@ fn is_free(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> bool {
     })
 }
 
-/// A hand on the straight way from one pose to another: 0 is at the start.
+/// A hand on the straight way from one pose to another; 0 is the start.
 fn between(from: &HandPose, to: &HandPose, share: f32) -> HandPose {
     let (a, b) = (from.frame_from_wrist, to.frame_from_wrist);
     HandPose {
@@ -149,24 +149,24 @@ fn between(from: &HandPose, to: &HandPose, share: f32) -> HandPose {
     }
 }
 
-/// Most hands that are kept clear of. More follow a motion more closely, and each takes a tenth of a millisecond per re-plan.
+/// Most recent hands to keep clear of. More follow a motion more closely, and each takes a tenth of a millisecond per re-plan.
 const MAX_HANDS: usize = 16;
 
-/// Largest distance of two poses of a hand that count as one, in metres: a headset's noise.
+/// Largest distance of two poses of a hand that count as the same, in metres: a headset's noise.
 const ALIKE: f32 = 0.001;
 
-/// Distance from recent hands that a motion like theirs leaves clear, in metres: no sway repeats itself to the millimetre.
+/// Clearance from recent hands in metres, as no sway repeats itself to the millimetre.
 const STEADY: f32 = GIVER_CLEARANCE + 0.002;
 
-/// What a metre less than [`STEADY`] counts as, in metres of a hand's way: a hand had rather go 10 cm than be a millimetre short.
+/// Cost of a metre less than [`STEADY`], in metres of a hand's way: a hand rather goes 10 cm than lacks a millimetre.
 const LACK: f32 = 100.0;
 
-/// Hands as they were lately, and are now.
+/// Recent poses of other people's hands, including the present ones.
 #[derive(Clone, Debug)]
 pub(in crate::search) struct RecentHands(Vec<PreparedHand>);
 
 impl RecentHands {
-    /// Those that differ most of some hands, of which the last is the present one.
+    /// Selects the hands that differ most; the last is the present one.
     pub(in crate::search) fn of(hands: &[Arc<HandJoints>]) -> Self {
         let mut chosen: Vec<&HandJoints> = hands.last().map(|hand| &**hand).into_iter().collect();
         let mut apart: Vec<f32> = vec![f32::INFINITY; hands.len()];
@@ -184,7 +184,7 @@ impl RecentHands {
         Self(chosen.iter().map(prepared).collect())
     }
 
-    /// How far a hand is short of keeping clear of all of them, in metres as [`super::way`] counts a way; 0 if it does.
+    /// The clearance that a hand lacks from all of them, in metres of way ([`super::way`]); 0 if it is clear.
     pub(in crate::search) fn lack(&self, hand: &TrackedSolids) -> f32 {
         let barriers = Barriers {
             hands: &self.0,
@@ -195,7 +195,7 @@ impl RecentHands {
     }
 }
 
-/// How far apart two poses of a hand are: the largest distance of wrist and fingertips.
+/// The distance of two poses of a hand: the largest of wrist and fingertips.
 fn distance(a: &HandJoints, b: &HandJoints) -> f32 {
     let at = |hand: &HandJoints, joint: usize| -> Vec3 { hand.joints[joint].pose.position };
     let ends = index::TIP_OF_DIGIT.into_iter().chain([index::WRIST]);
