@@ -11,8 +11,8 @@ use grasp_synthesis::known::{atlas::Atlas, growth::Grown};
 /// Time after which a call counts half.
 const HALF_LIFE: Duration = Duration::from_mins(5);
 
-/// A decayed count of calls. It is kept as the binary logarithm of what the count would be had calls from the clock's start
-/// on grown instead of decayed: all counts decay alike, so that comparing them needs no clock.
+/// A decayed count of calls, as the binary logarithm of a count in which later calls weigh more instead of earlier ones less: all
+/// counts decay alike, so that comparing them needs no clock.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(crate) struct Demand(f64);
 
@@ -92,8 +92,7 @@ impl Slot {
     }
 }
 
-/// Largest number of slots of an object. Hands come in as many sizes and shapes as clients create; more in turn than this
-/// lose their atlases to one another.
+/// Largest number of slots of an object: hands come in as many sizes and shapes as clients create.
 const MAX_HANDS: usize = 16;
 
 /// The slots of one object, for each hand that was requested; beyond [`MAX_HANDS`], the one in least demand is dropped.
@@ -146,7 +145,7 @@ impl AtlasSlots {
     }
 
     /// Fills a hand's slot with that of another object of the same grips. Growth of that object's atlas ends with the object, so
-    /// what is not complete is absent here until it is requested.
+    /// an incomplete atlas is absent here until it is requested.
     pub(crate) fn take_over(&self, hand: &Arc<Hand>, slot: Slot) {
         self.with(hand, |own| {
             *own = Slot {
@@ -164,7 +163,7 @@ impl AtlasSlots {
         self.with(hand, |slot| slot.state = state);
     }
 
-    /// Drops the atlas and what was learned. One in the build queue stays there.
+    /// Drops the atlas and the learned grips. An atlas in the build queue stays there.
     pub(crate) fn evict(&self, hand: &Arc<Hand>) {
         self.with(hand, |slot| {
             *slot = Slot {

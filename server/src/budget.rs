@@ -68,26 +68,23 @@ pub(crate) fn parse_grpc_timeout(header: &str) -> Option<Duration> {
     }
 }
 
-/// Reserve over measured delay. The server sees only the delay from the end of the search until the transport has the
-/// answer; as much again is for the ways from and to the client, on a machine that may be as busy.
+/// Reserve over measured delay: the server does not see the ways from and to the client, which may take as long.
 const MARGIN: f64 = 2.0;
 
-/// Time after which a measured delay counts half. Longer ones remember rarer delays; shorter ones give searches their
-/// time back sooner after a load has ended.
+/// Time after which a measured delay counts half.
 const HALF_LIFE: Duration = Duration::from_secs(10);
 
-/// Delays count up to this long: longer ones are a stall, not a load, and would take minutes to forget.
+/// Longest delay that counts: longer ones are a stall, not a load, and would take minutes to forget.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 
-/// Keeps a multiple of recent delays, but no less than a minimum. A delay counts at once, and less as time passes: what
-/// counts is the largest of all delays, each halved for every [`HALF_LIFE`] since.
+/// Keeps a multiple of recent delays, but no less than a minimum. The largest of all delays counts, each halved for
+/// every [`HALF_LIFE`] since.
 #[derive(Debug)]
 pub(crate) struct DeadlineReserve {
     minimum: Duration,
     epoch: Instant,
-    /// The largest of log₂ of a delay in microseconds plus its time since the epoch in half-lives, as the bits of an
-    /// `f64`. The order of decayed delays is that of these sums, at any time; that of the bits, too, as no sum is
-    /// negative.
+    /// The largest sum of log₂ of a delay in microseconds and its time since the epoch in half-lives, as the bits of an `f64`. Sums
+    /// order like decayed delays at any time, and bits like sums, because none is negative.
     level: AtomicU64,
 }
 

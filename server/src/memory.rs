@@ -1,7 +1,7 @@
 //! Warns of configured limits that add up to more memory than the process may use.
 //!
-//! The limits are kept while the server runs: caches evict, and calls beyond them are refused. What comes on top is small or
-//! short-lived: threads, connections, and what searches and readers of meshes work with.
+//! The limits are kept while the server runs: caches evict, and calls beyond them are refused. All other memory is small or
+//! short-lived: threads, connections, and the working memory of searches and readers of meshes.
 //!
 //! Limits of the process are read from files, which needs no foreign code. Where those are missing, as on systems other than Linux,
 //! none are found.

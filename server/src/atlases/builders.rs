@@ -1,4 +1,4 @@
-//! The threads that build atlases, and the queue of what they build.
+//! The threads that build atlases, and their queue.
 
 use std::{
     collections::VecDeque,
@@ -29,7 +29,7 @@ use crate::{
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 19;
 
-/// What the builder threads share.
+/// State shared by the builder threads.
 #[derive(Debug)]
 pub(super) struct Builders {
     pub queue: BuildQueue,
@@ -94,8 +94,7 @@ impl Builders {
     }
 }
 
-/// Starts a thread that grows atlases, or one that reads them at the priority of other threads: reading takes a millisecond, and
-/// requests wait for what was dropped from memory.
+/// Starts a thread that grows atlases, or one that reads them at the priority of other threads: requests wait for those.
 pub(super) fn start_thread(builders: &Arc<Builders>, name: String, grows: bool) -> std::io::Result<()> {
     let builders = Arc::clone(builders);
     let thread = thread::Builder::new().name(name).spawn(move || {
@@ -117,8 +116,7 @@ fn lower_priority() {
     }
 }
 
-/// What completing a useful atlas is worth per time of a builder, of what making another useful is: the former answers one
-/// call in ten more and takes six times as long, the latter answers nine in ten.
+/// Worth of completing an atlas, relative to making another useful: a ninth of the calls, for six times the work.
 const WORTH_OF_COMPLETING: f64 = 1.0 / 64.0;
 
 /// How far an atlas in the queue has got.
@@ -137,12 +135,12 @@ pub(super) struct BuildJob {
     /// The object; gone once it was evicted.
     pub object: Weak<StoredObject>,
     pub hand: Arc<Hand>,
-    /// What comes next.
+    /// The next stage.
     pub stage: Stage,
 }
 
 impl BuildJob {
-    /// What it is worth per time of a builder, as if it were a demand. `None` if its object or slot is gone.
+    /// Its worth per time of a builder, as a demand. `None` if its object or slot is gone.
     fn worth(&self) -> Option<Demand> {
         let demand = self.object.upgrade()?.atlas_slots.demand(&self.hand)?;
         Some(match self.stage {
@@ -163,12 +161,12 @@ pub(super) struct BuildQueue {
 impl BuildQueue {
     pub(super) fn push(&self, job: BuildJob) {
         self.jobs().push_back(job);
-        // Not each waits for jobs of any stage.
+        // Some threads wait for jobs of certain stages only.
         self.has_jobs.notify_all();
     }
 
-    /// Waits for an atlas to grow or to read. `None` once the queue was stopped. What is in most demand comes first, the oldest of
-    /// several; all others are useful before an atlas is completed, unless it is in far more demand.
+    /// Waits for an atlas to grow or to read. `None` once the queue was stopped. The atlas in most demand comes first, the oldest
+    /// of several; all others are useful before an atlas is completed, unless it is in far more demand.
     pub(super) fn next(&self, grows: bool) -> Option<BuildJob> {
         let mut jobs = self.jobs();
         loop {
@@ -254,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn serves_what_is_in_most_demand_and_useful_slices_before_completions() {
+    fn serves_the_job_in_most_demand_and_useful_slices_before_completions() {
         let queue = BuildQueue::default();
         let calls = [
             ("once", 1),
@@ -298,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn a_completion_lets_only_slices_go_first_that_are_worth_more() {
+    fn only_slices_that_are_worth_more_precede_a_completion() {
         let queue = BuildQueue::default();
         let object = asked_for("completing", 100);
         let completing = job(&object, Stage::Completing);

@@ -1,4 +1,4 @@
-//! Atlases on disk: one file per object and hand, named after a hash of what the atlas was made from.
+//! Atlases on disk: one file per object and hand, named after a hash of the atlas' inputs.
 //!
 //! A file is written under a temporary name ending in `.part` and then renamed, so that readers find the old file or
 //! the new one, never half of one. All files together take at most [`MAX_BYTES`]; beyond that, the least recently used
@@ -249,7 +249,7 @@ mod tests {
     const KEY: &str = "0123456789abcdef0123456789abcdef";
 
     #[test]
-    fn reads_what_was_written_and_rejects_broken_files() {
+    fn reads_written_files_and_rejects_broken_ones() {
         let folder = Folder::new("files");
         let files = folder.open();
         let (object, other) = (small("a"), cuboid("b", Vec3::new(0.03, 0.015, 0.05)));

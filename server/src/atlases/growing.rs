@@ -42,7 +42,7 @@ const FIRST: usize = 64;
 /// During its first slice, an atlas is published again once it grew by one part in this many.
 const GROWTH_PER_PUBLISH: usize = 2;
 
-/// Memory that must be free, or held for what is in less demand, before an atlas is grown: that of a complete one.
+/// Memory that must be free, or held by atlases in less demand, before an atlas is grown: that of a complete one.
 const EXPECTED_BYTES: usize = 300_000;
 
 /// Pause while searches run, in multiples of the time just worked: with 9, a builder works a tenth of the time.
@@ -102,7 +102,7 @@ fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn
     let Some(slot) = object.atlas_slots.get(&job.hand) else {
         return Turn::Dropped;
     };
-    // What was dropped from memory since its first slice is read again.
+    // An atlas that was dropped from memory since its first slice is read again.
     if job.stage == Stage::Completing && slot.grown.is_none() {
         return Turn::Next(Stage::Unread);
     }
@@ -172,7 +172,7 @@ impl Growing<'_> {
         self.end(Turn::Next(Stage::Completing))
     }
 
-    /// Grows until there is enough to choose from. What is more urgent comes in between, so that no growth is given up.
+    /// Grows until there is enough to choose from. More urgent jobs come in between, so that no growth is given up.
     fn complete(mut self) -> Turn {
         while !self.growth.is_enough() {
             if self.round().is_none() {
@@ -185,7 +185,7 @@ impl Growing<'_> {
         self.end(Turn::Ended(BuildState::Finished))
     }
 
-    /// Runs a round; the processor time that it took, or none if nobody needs the atlas any more.
+    /// Runs a round, and returns its processor time; `None` if nobody needs the atlas.
     fn round(&mut self) -> Option<Duration> {
         // If this thread holds the last reference, the object was evicted.
         if self.builders.queue.is_stopped() || Arc::strong_count(self.object) == 1 {
@@ -199,7 +199,7 @@ impl Growing<'_> {
         Some(worked)
     }
 
-    /// Keeps what has grown, after which the turn ends.
+    /// Keeps the grown grips and ends the turn.
     fn end(&mut self, turn: Turn) -> Turn {
         if self.keep() {
             turn
@@ -271,10 +271,7 @@ fn log_progress(object: &StoredObject, hand: &Arc<Hand>, before: &Slot) {
     );
 }
 
-/// The hand whose growth is an atlas, or becomes one as its mirror image.
-///
-/// On a symmetric object, what one hand can do, the other can. The left hand's grips are therefore the mirror images of the right
-/// hand's: mirrored holdouts have mirrored answers, and both hands share a file.
+/// The hand whose growth is an atlas or, for the left hand on a symmetric object, becomes one as its mirror image.
 #[derive(Debug)]
 struct Plan {
     grows: Arc<Hand>,
@@ -292,7 +289,7 @@ impl Plan {
         }
     }
 
-    /// What has grown as an atlas of the hand.
+    /// The grown grips as an atlas of the hand.
     fn placed(&self, grown: Grown, object: &PreparedObject, of: &Hand) -> Grown {
         match self.mirror {
             Some(mirror) => grown.mirrored(mirror, object.object(), &of.rig),

@@ -2,9 +2,9 @@
 //!
 //! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for each
 //! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
-//! [`queue`](builders::BuildQueue), read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is in most demand
-//! comes first ([`demand`](crate::atlas_slots::Demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
-//! [`files`] keeps them on disk if there is a folder for them. Beside each atlas, the latest grips that searches found are learned.
+//! [`queue`](builders::BuildQueue), read them on a thread of its own, and grow them on low-priority threads, at a tenth of the
+//! time while searches run. Atlases in most [`demand`](crate::atlas_slots::Demand) come first: each has a slice of work until it is
+//! useful, then its turn to be completed. [`files`] keeps them on disk if there is a folder. Grips of searches are learned.
 //!
 //! For the built-in objects, a few hundred grips per hand ship with the server, and nothing grows.
 //!
@@ -41,7 +41,7 @@ use crate::{
 #[derive(Debug)]
 pub(crate) struct Atlases(Arc<Builders>);
 
-/// What is known of how a hand can hold an object.
+/// The known grips of an object and a hand.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KnownGrips {
     /// The atlas, unless it is still empty.
@@ -51,7 +51,7 @@ pub(crate) struct KnownGrips {
 }
 
 impl KnownGrips {
-    /// True if nothing is known.
+    /// True if there are none.
     pub(crate) fn is_empty(&self) -> bool {
         self.atlas.is_none() && self.learned.is_empty()
     }
@@ -97,8 +97,7 @@ impl Atlases {
         }
     }
 
-    /// As [`Self::register`] for an object that was changed. A change that grips do not depend on, such as of what to avoid, leaves it its
-    /// atlases.
+    /// Like [`Self::register`] for a changed object, which keeps its atlases if grips do not depend on the change.
     pub(crate) fn register_changed(&self, before: &StoredObject, object: &Arc<StoredObject>) {
         if self.0.are_running() && object.has_grips_of(before) {
             for (hand, slot) in before.atlas_slots.all() {

@@ -123,7 +123,7 @@ fn until(what: &str, condition: impl Fn() -> bool) {
 }
 
 #[test]
-fn evicts_what_is_in_least_demand() {
+fn evicts_the_atlas_in_least_demand() {
     let [a, b, c] = ["a", "b", "c"].map(|id| Arc::new(small(id)));
     let grown = grown(&a);
     // Without threads, only this test publishes.
@@ -194,7 +194,7 @@ fn learns_up_to_the_limit_and_counts_it_toward_the_memory() {
 }
 
 #[test]
-fn learns_only_what_fits_and_only_of_requested_hands() {
+fn learns_only_grips_that_fit_and_only_of_requested_hands() {
     let object = Arc::new(small("a"));
     let grip = grown(&object).atlas.entries()[0].clone();
     let no_room = start(1, &store(10, 0));
@@ -263,7 +263,7 @@ fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
     assert!(dropped.grown.is_none() && dropped.learned.is_empty());
 }
 
-/// What a server reads from the file of an atlas, and how many grips the file has afterwards.
+/// The atlas that a server reads from a file, and how many grips the file has afterwards.
 fn read_back(test: &str, written: &Grown) -> (Arc<Grown>, usize) {
     let folder = Folder::new(test);
     let files = folder.open();
@@ -286,7 +286,7 @@ fn read_back(test: &str, written: &Grown) -> (Arc<Grown>, usize) {
 }
 
 #[test]
-fn a_complete_file_is_read_as_it_is_and_a_longer_one_is_cut_to_what_is_kept() {
+fn a_complete_file_is_read_as_it_is_and_a_longer_one_is_cut() {
     let object = small("a");
     let prepared = prepared(&object);
     let mut growth = Growth::new(&prepared, &adult().rig);

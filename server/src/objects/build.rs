@@ -76,7 +76,7 @@ pub(crate) fn build_object(
     ))
 }
 
-/// The object with what its client knows of it.
+/// The object with its client's knowledge of it.
 fn with_given(
     object: Result<PlainObject, Vec<ObjectError>>,
     given: &Given,
@@ -160,7 +160,7 @@ pub(crate) fn changed(
     )))
 }
 
-/// The object as its mesh makes it with another unit, and what is then kept of its file.
+/// The object with another unit, and its file.
 fn with_unit(
     stored: &StoredObject,
     unit_metres: f32,
@@ -183,7 +183,7 @@ fn with_unit(
     Ok((resized, Arc::new(file)))
 }
 
-/// Changes the object that a client would create to the changed one.
+/// Applies a change to an object as a client would create it.
 pub(crate) fn change_given(object: &mut v1::GraspObject, change: &ObjectChange) {
     if change.unit_metres.is_some() {
         object.meters_per_unit = change.unit_metres;
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_shares_the_mesh_and_makes_what_would_be_created() {
+    fn a_change_shares_the_mesh_and_equals_a_new_object() {
         let before = object(TETRAHEDRON);
         let change = ObjectChange {
             mass: Some(0.4),

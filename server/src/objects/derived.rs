@@ -1,4 +1,4 @@
-//! What is derived from an object for searching it: built when it is first needed, and dropped first when memory is short.
+//! Data derived from objects for searches: built when first needed, and dropped first when memory is short.
 
 use std::{
     sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
@@ -30,14 +30,13 @@ use crate::{
     validate::RequestedSize,
 };
 
-/// Estimated bytes of what is derived, per triangle and in any case, before it is built: the hierarchy's nodes and packs, and the
-/// field of distances, samples, pairs and placements.
+/// Estimated bytes of derived data before it is built: per triangle, and besides.
 const BYTES_PER_TRIANGLE: usize = 160;
 const BYTES_BESIDES: usize = 480 << 10;
 
 type GripsSlot = OnceLock<Arc<TransferredGrips>>;
 
-/// An object in the form that searches use, with what they start from. Clones share both.
+/// An object in the form that searches use, with the grips that they start from. Clones share both.
 #[derive(Clone, Debug)]
 pub(crate) struct Derived {
     pub object: Arc<PreparedObject>,
@@ -48,7 +47,7 @@ pub(crate) struct Derived {
 }
 
 impl Derived {
-    /// Of an object that has its search structures.
+    /// Derives the data of an object that has its search structures.
     pub(super) fn of(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Arc<Self>, Stopped> {
         Ok(Arc::new(Self {
             object: Arc::new(PreparedObject::new_until(object, stop)?),
@@ -104,7 +103,7 @@ impl Derived {
         (!grips.is_empty()).then(|| Arc::clone(grips))
     }
 
-    /// The primitives' grips for a hand, and the place of those transferred from them.
+    /// The primitives' grips for a hand, and the slot of the grips transferred from them.
     fn transferred_grips_of(&self, hand: &Hand) -> Option<(&'static Arc<[HeldPrimitive]>, &GripsSlot)> {
         let all = || held_primitives().iter().zip(&*self.transferred_grips);
         let is_side = |of: &Hand| of.rig.handedness == hand.rig.handedness;
@@ -114,13 +113,13 @@ impl Derived {
         Some((held, grips))
     }
 
-    /// Its estimated size in bytes, with what is made for two hands.
+    /// Its estimated size in bytes, with the placements and grips of two hands.
     pub(crate) fn bytes(&self) -> usize {
         self.object.derived_bytes() + 2 * TransferredGrips::MAX_BYTES
     }
 }
 
-/// Where what is derived from an object is kept.
+/// Holds the data derived from an object.
 #[derive(Debug, Default)]
 pub(super) struct DerivedCell {
     kept: Mutex<Option<Arc<Derived>>>,
@@ -129,12 +128,12 @@ pub(super) struct DerivedCell {
 }
 
 impl DerivedCell {
-    /// What is kept.
+    /// The data, if kept.
     pub(super) fn get(&self) -> Option<Arc<Derived>> {
         self.lock().clone()
     }
 
-    /// What is kept, or else what `build` makes of it, unless another call does so meanwhile.
+    /// The data. Calls `build` unless it is kept, or another call builds it meanwhile.
     pub(super) fn get_or_build(
         &self,
         build: impl FnOnce() -> Result<Arc<Derived>, Stopped>,
@@ -149,12 +148,12 @@ impl DerivedCell {
         Ok(built)
     }
 
-    /// Keeps it no longer. Calls that use it are not disturbed.
+    /// Drops the data. Calls that use it are not disturbed.
     pub(super) fn forget(&self) {
         *self.lock() = None;
     }
 
-    /// True if a call uses what is kept.
+    /// True if a call uses the data.
     pub(super) fn is_in_use(&self) -> bool {
         let kept = self.lock();
         kept.as_ref().is_some_and(|kept| Arc::strong_count(kept) > 1)
@@ -166,7 +165,7 @@ impl DerivedCell {
     }
 }
 
-/// The size that what is derived from an object will have at most, in bytes, for all but the oddest surfaces.
+/// Upper bound on the size of an object's derived data in bytes, for all but the oddest surfaces.
 pub(super) fn expected_bytes(object: &PlainObject) -> usize {
     BYTES_BESIDES + BYTES_PER_TRIANGLE * object.mesh.triangles().len()
 }
@@ -180,7 +179,7 @@ pub(crate) struct ObjectSize {
 }
 
 impl ObjectSize {
-    /// The size that a request asks for. `None` for the object as it is stored.
+    /// The requested size. `None` for the object as it is stored.
     pub(crate) fn of(requested: RequestedSize, stored: &StoredObject) -> Option<Self> {
         let own = stored.object.mass;
         let mut size = Self {
@@ -269,11 +268,11 @@ mod tests {
     use crate::objects::tests::tetrahedron;
 
     #[test]
-    fn what_is_prepared_is_not_prepared_again() {
+    fn a_prepared_hand_is_not_prepared_again() {
         let object = tetrahedron("any", 0.05, &[]);
         let derived = object.derived_until(Stop::NEVER).expect("nothing stops it");
         assert!(!derived.is_prepared("adult"));
-        // Work that looks whether it is to stop ends there.
+        // Work that checks for a stop ends at once.
         let no_work = Stop::when(&|| true);
         assert_eq!(derived.prepare("adult", no_work), Err(Stopped));
         derived.prepare("adult", Stop::NEVER).expect("nothing stops it");

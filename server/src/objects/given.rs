@@ -1,4 +1,4 @@
-//! What a client knows of its object: regions and grips, as given and as they are on the mesh.
+//! A client's knowledge of its object: regions and grips, as given and on the mesh.
 
 use std::sync::Arc;
 
@@ -33,27 +33,27 @@ use crate::{
 /// Triangles compared with the shapes of forbidden regions between two checks of the stop.
 const TRIANGLES_PER_CHECK: usize = 256;
 
-/// What a client knows of its object. By default nothing.
+/// A client's knowledge of its object; empty by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Given {
     /// The centre of mass in metres, in the object's frame. `None` for that of the mesh.
     pub centre_of_mass: Option<Vec3>,
     pub regions: Arc<[RegionFields]>,
-    /// The grips to try first, or not to answer.
+    /// Preferred and banned grips.
     pub grips: Arc<[GripFields]>,
 }
 
-/// What it means for the triangles of a mesh.
+/// The regions on the triangles of a mesh.
 #[derive(Debug)]
 pub(super) struct OnMesh {
     /// The triangles that must not be touched, ascending.
     pub forbidden: Vec<u32>,
-    /// What hands should take or leave.
+    /// The preferred and avoided regions.
     pub regions: Regions,
 }
 
 impl Given {
-    /// What the contract has of a built-in object: the triangles that must not be touched as a region.
+    /// A built-in object's forbidden triangles as a region, as the contract has it.
     pub(super) fn of_built_in(object: &PlainObject) -> Self {
         let all = 0..u32::try_from(object.mesh.triangles().len()).expect("built-in meshes are small");
         let triangles: Vec<u32> = all.filter(|&triangle| object.is_forbidden(triangle)).collect();
@@ -71,7 +71,7 @@ impl Given {
         }
     }
 
-    /// Finds it on a mesh from a file. Adds a violation for each name and index that is not in the file.
+    /// Locates the regions on a mesh from a file. Adds a violation for each name and index that is not in the file.
     pub(super) fn on_mesh(
         &self,
         mesh: &TriangleMesh,
@@ -115,7 +115,7 @@ impl Given {
         })
     }
 
-    /// The grips that are not to be answered.
+    /// The grips that must not be answered.
     pub(super) fn banned(&self) -> Vec<BannedGrip> {
         let banned = self.grips.iter().filter_map(|grip| match grip.kind {
             Some(GripKind::Banned(banned)) => Some(banned),
@@ -154,8 +154,7 @@ impl Given {
         self.grips.iter().map(of_grip).collect()
     }
 
-    /// The same about the object resized, `scale` times as large. `rigs` are those of its grips; a hand whose rig is not known keeps
-    /// its digits.
+    /// The same for the object resized to `scale`. `rigs` are those of its grips; the digits of a hand without a known rig stay.
     pub(super) fn at_scale(
         &self,
         scale: f32,
@@ -183,7 +182,7 @@ impl Given {
                 GripKind::Preferred(preferred) if scale != 1.0 => {
                     GripKind::Preferred(moved(preferred, rig.as_ref()))
                 }
-                // The object at its size knows banned ones.
+                // The resized object has its banned grips.
                 kind => kind,
             }),
             ..grip.clone()
@@ -215,7 +214,7 @@ impl Given {
     }
 }
 
-/// What a wrist may be given in.
+/// The conventions in which a wrist may be given.
 const CONVENTIONS: [v1::Convention; 6] = [
     v1::Convention::Openxr,
     v1::Convention::Unity,
@@ -225,7 +224,7 @@ const CONVENTIONS: [v1::Convention; 6] = [
     v1::Convention::Godot,
 ];
 
-/// Checks the preferred grips of an object of whose rigs `rig` knows the hand.
+/// Checks the preferred grips of an object whose rigs `rig` knows.
 pub(crate) fn check_grips(
     stored: &StoredObject,
     rig: impl Fn(&str, Handedness) -> Option<Rig>,
@@ -275,7 +274,7 @@ pub(crate) fn check_grips(
     violations.finish(())
 }
 
-/// What is wrong with a hand.
+/// Why a hand does not fit the object.
 fn in_words(misfit: Misfit) -> String {
     let most = 1e3 * MAX_PENETRATION;
     match misfit {

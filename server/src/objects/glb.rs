@@ -24,13 +24,13 @@ const TRIPLE: usize = 12;
 /// one, which has up to 24 bytes in the JSON.
 const PER_PIECE: usize = PIECE_BYTES / TRIPLE;
 
-/// Stands for the runs of forbidden triangles in the JSON. No id of an object has such a character.
+/// Placeholder for the runs of forbidden triangles in the JSON. No id of an object has such a character.
 const RUNS: &str = "*";
 
 /// The same in quotes, as the JSON has it.
 const QUOTED_RUNS: &str = "\"*\"";
 
-/// Base colours of the two materials, linear: a light grey, and red for what must not be touched.
+/// Base colours of the two materials, linear: a light grey, and red for forbidden triangles.
 const ALLOWED_COLOUR: [f32; 4] = [0.6, 0.6, 0.6, 1.0];
 const FORBIDDEN_COLOUR: [f32; 4] = [0.7, 0.05, 0.05, 1.0];
 
@@ -76,7 +76,7 @@ pub(crate) fn glb_pieces(object: &Arc<StoredObject>) -> impl Iterator<Item = Vec
         .map(|(piece, _)| piece)
 }
 
-/// What `part` makes of `count` elements of an object, from each [`PER_PIECE`]th on.
+/// `part` of an object from every [`PER_PIECE`]th of its `count` elements on.
 fn parts_of<F: Fn(&PlainObject, usize) -> Vec<u8> + Clone>(
     object: &Arc<StoredObject>,
     count: usize,
@@ -91,8 +91,7 @@ fn binary_bytes(mesh: &TriangleMesh) -> usize {
     TRIPLE * (mesh.positions().len() + mesh.triangles().len())
 }
 
-/// The file's JSON before and after the runs of forbidden triangles: one mesh of up to two primitives that share their vertices,
-/// triangles that may be touched before those that must not.
+/// The file's JSON before and after the runs of forbidden triangles: one mesh, with allowed triangles before forbidden ones.
 fn document(object: &PlainObject, name: &str) -> [String; 2] {
     let mesh = &object.mesh;
     let (vertices, triangles) = (mesh.positions().len(), mesh.triangles().len());
@@ -157,8 +156,7 @@ fn document(object: &PlainObject, name: &str) -> [String; 2] {
     }
 }
 
-/// Where the forbidden triangles are among all of the mesh, whose indices contacts name: for the runs that begin among
-/// [`PER_PIECE`] triangles from one on, the first of each run and how many follow one another, as in the list of the JSON.
+/// Elements of the JSON's list, first triangle and length, for the forbidden runs that begin among [`PER_PIECE`] triangles.
 fn runs_from(object: &PlainObject, from: usize) -> Vec<u8> {
     let all = count(object.mesh.triangles().len());
     let is_forbidden = |&triangle: &u32| object.is_forbidden(triangle);

@@ -1,5 +1,5 @@
-//! What is kept of the file that an object was created from: how clients name its triangles, by index and by group. And what is
-//! measured of its mesh: whether it is as large as something that is held, and its centre of mass.
+//! The file that an object was created from: clients name its triangles, by index and by group. Also the checks of its mesh's
+//! size, and its centre of mass.
 
 use std::ops::Range;
 
@@ -13,14 +13,14 @@ use crate::validate::{Field, quoted};
 /// Largest number of group names in an error.
 const LISTED_GROUPS: usize = 12;
 
-/// What is kept of a mesh's file: a few bytes per group, and four per triangle if the file had others that were dropped.
+/// The data kept of a mesh's file: a few bytes per group, and four per triangle if the file had others that were dropped.
 #[derive(Clone, Debug)]
 pub(crate) struct MeshFile {
     /// The length of one unit of the file, in metres.
     pub unit_metres: f32,
     /// True if the file's +Z points up.
     pub z_up: bool,
-    /// The names of the file's parts that are the object; empty for those that are seen.
+    /// The names of the file's parts that are the object; empty for all visible parts.
     pub parts: Box<[String]>,
     /// The object's origin in the file, in the file's units and axes.
     pub origin: DVec3,
@@ -41,7 +41,7 @@ struct Group {
 }
 
 impl MeshFile {
-    /// Of a mesh without names whose triangles are those of its file.
+    /// The file of a mesh without names whose triangles are those of its file.
     pub(super) fn plain(triangles: usize) -> Self {
         Self {
             unit_metres: 1.0,
@@ -54,7 +54,7 @@ impl MeshFile {
         }
     }
 
-    /// Of a mesh that was read with this unit and these axes, from these parts.
+    /// The file of a mesh that was read with this unit and these axes, from these parts.
     pub(super) fn of(read: &ImportedMesh, import: Import, parts: &[String]) -> Self {
         let is_complete = read.indices_in_file.len() == read.triangles_in_file;
         let groups = read.groups.iter();
@@ -151,21 +151,19 @@ fn runs(triangles: &[u32]) -> Box<[Range<u32>]> {
 /// Longest edges of a bounding box without a warning, in metres: from a bead to a long pole.
 const USUAL: [f32; 2] = [0.002, 5.0];
 
-/// Longest edges of a bounding box that can be used at all, in metres. Within them, squares of the areas of triangles a thousandth
-/// as long are normal numbers in single precision, and so is the square of the volume.
+/// Longest edges of usable bounding boxes, in metres: squares of areas and volumes stay normal numbers in single precision.
 const USABLE: [f32; 2] = [1e-6, 1e6];
 
 /// Longest edges of most things that are held, in metres.
 const PLAUSIBLE: [f32; 2] = [0.03, 1.0];
 
-/// By what a wrong unit is usually off: micrometres, millimetres, centimetres, inches or decimetres for metres, a unit converted
-/// twice, and the contrary.
+/// Factors of the usual errors of units, units converted twice included, and their inverses.
 const USUAL_ERRORS: [f32; 9] = [1e-6, 0.001, 0.01, 0.0254, 0.1, 10.0, 100.0, 1000.0, 1e6];
 
-/// What the warning about an unusual size says after the number.
+/// The text after the number in the warning about an unusual size.
 const UNUSUAL: &str = "m long, which is unusual";
 
-/// A warning about an unusual size, instead of one from before.
+/// Checks the size, and replaces the warning about an unusual one.
 pub(super) fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>) -> Result<(), String> {
     warnings.retain(|warning| !warning.contains(UNUSUAL));
     let extent = usable_extent(mesh)
@@ -209,7 +207,7 @@ fn within([low, high]: [f32; 2], extent: f32) -> bool {
     (low..=high).contains(&extent)
 }
 
-/// The usual error whose correction brings a length nearest to the middle of what is plausible.
+/// The usual error whose correction brings a length nearest to the middle of the plausible ones.
 fn likely_factor(extent: f32) -> f32 {
     let middle = (PLAUSIBLE[0] * PLAUSIBLE[1]).sqrt();
     let off = |factor: f32| (extent * factor / middle).ln().abs();
@@ -219,15 +217,13 @@ fn likely_factor(extent: f32) -> f32 {
         .unwrap_or(1.0)
 }
 
-/// Smallest enclosed share of the bounding box for which the volume is used. A sheet of paper encloses less, and so
-/// does an open mesh whose signed tetrahedra cancel.
+/// Smallest enclosed share of the bounding box for which the volume is used: sheets and many open meshes enclose less.
 const MIN_VOLUME_SHARE: f64 = 1e-4;
 
 /// The warning about a centre of mass that was computed from the surface.
 const SURFACE_WARNING: &str = "the mesh encloses no volume: the centre of mass is that of its surface";
 
-/// The given centre of mass or, without one, that of the mesh, in metres. Adds a warning if the latter is that of the
-/// surface, and removes one from before.
+/// The given centre of mass, or else that of the mesh, in metres. Adds or removes the warning about a centre of the surface.
 pub(super) fn centre_or_computed(
     mesh: &TriangleMesh,
     given: Option<Vec3>,
@@ -240,9 +236,7 @@ pub(super) fn centre_or_computed(
     })
 }
 
-/// The centre of the enclosed volume by the divergence theorem: signed tetrahedra between every triangle and one point. `None`
-/// if there is no volume, or if its centre would be outside the bounding box, as it may be for a mesh that is open or has
-/// inconsistent winding.
+/// The centre of the enclosed volume, by the divergence theorem. `None` without a volume, or if it is outside the bounding box.
 fn centre_of_volume(mesh: &TriangleMesh) -> Option<Vec3> {
     let Aabb { min, max } = Aabb::around(mesh.positions().iter().copied());
     let (low, high) = (min.as_dvec3(), max.as_dvec3());
@@ -299,7 +293,7 @@ mod tests {
     }
 
     proptest! {
-        /// The compact form forbids what a search through the file's lists forbids.
+        /// The compact form forbids the same triangles as a search through the file's lists.
         #[test]
         fn forbids_the_triangles_of_the_file(
             kept in prop::collection::btree_set(0_u32..40, 1..30),

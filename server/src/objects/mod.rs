@@ -53,7 +53,7 @@ pub(crate) struct StoredObject {
 }
 
 impl StoredObject {
-    /// A built-in object, with what is derived from it.
+    /// A built-in object with its derived data.
     pub(crate) fn built_in(id: String, object: Arc<GraspObject>) -> Self {
         let plain = object.plain().clone();
         let file = MeshFile::plain(plain.mesh.triangles().len());
@@ -87,12 +87,12 @@ impl StoredObject {
         }
     }
 
-    /// Keeps what is derived from an object that has its search structures.
+    /// Keeps the data derived from an object that has its search structures.
     fn fill(&self, object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Arc<Derived>, Stopped> {
         self.derived.get_or_build(|| Derived::of(object, stop))
     }
 
-    /// What is derived from it, built if necessary: some ten milliseconds, up to seconds for the largest meshes. It stays until
+    /// The derived data, built if necessary: some ten milliseconds, up to seconds for the largest meshes. It stays until
     /// the object is dropped; the store does the same within the bounds of the cache.
     pub(crate) fn derived_until(&self, stop: Stop<'_>) -> Result<Arc<Derived>, Stopped> {
         self.derived.get_or_build(|| {
@@ -101,7 +101,7 @@ impl StoredObject {
         })
     }
 
-    /// Keeps it from being evicted, and what is derived from it with it, as long as the reference is held.
+    /// Keeps the object and its derived data from being evicted as long as the reference is held.
     pub(crate) fn hold(&self) -> Arc<()> {
         Arc::clone(&self.uses)
     }
@@ -120,7 +120,7 @@ impl StoredObject {
             && (self.given.regions == other.given.regions || !is_guided(self) && !is_guided(other))
     }
 
-    /// True if the same can be derived from it as from another object.
+    /// True if its derived data equals that of another object.
     fn derives_as(&self, other: &Self) -> bool {
         self.has_grips_of(other)
             && self.given.regions == other.given.regions
@@ -140,7 +140,7 @@ impl StoredObject {
             + self.given.bytes()
     }
 
-    /// Its estimated size in bytes with what is derived from it, built or not.
+    /// Its estimated size in bytes with its derived data, built or not.
     pub(crate) fn derived_and_own_bytes(&self) -> usize {
         let derived = self.derived.get();
         self.bytes() + derived.map_or_else(|| expected_bytes(&self.object), |derived| derived.bytes())
@@ -196,7 +196,7 @@ pub(crate) struct Revision {
     pub record: Arc<Record>,
 }
 
-/// An object or what is in memory of it.
+/// An object, in memory or at rest.
 #[derive(Clone, Debug)]
 pub(crate) enum Body {
     Loaded(Arc<StoredObject>),
@@ -231,7 +231,7 @@ impl Listed {
         }
     }
 
-    /// The state of an object that is ready for searches, or else what describes it.
+    /// The state of an object that is ready for searches, or else the message that describes it.
     pub(crate) fn loaded(self) -> Result<Revision, Arc<v1::GraspObject>> {
         let record = self.record;
         match self.body {

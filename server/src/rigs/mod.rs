@@ -49,7 +49,7 @@ pub(crate) struct StoredRig {
     pub hands: [RigHand; 2],
     /// True for the hand that is the other one's mirror image.
     pub mirrored: [bool; 2],
-    /// What was repaired.
+    /// Repairs of the model.
     pub warnings: Vec<String>,
 }
 
@@ -85,7 +85,7 @@ pub(crate) fn resource_name(rig: &Rig) -> String {
 /// oppositions again, which takes tenths of a second.
 const CAPACITY: usize = 16;
 
-/// A hand with the one and the hundredths that it was made from.
+/// A scaled hand, with its original and the hundredths of its scale.
 #[derive(Debug)]
 struct Scaled {
     of: Arc<Hand>,
@@ -104,7 +104,7 @@ impl ScaledHands {
         // No code panics while it holds the lock; if some did, the list would still be consistent.
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let place = kept.iter().position(|scaled| {
-            // Equal rigs may have different names, which answers have.
+            // Equal rigs may have different names, and answers name the rig.
             scaled.hundredths == hundredths
                 && scaled.of == hand.hand
                 && scaled.of.rig.name == hand.hand.rig.name

@@ -28,7 +28,7 @@ use crate::{
 pub(crate) struct RigStore {
     built_in: BTreeMap<String, Arc<StoredRig>>,
     created: Mutex<CreatedRigs>,
-    /// Held while a rig is added or deleted, so that what is saved and what is in memory agree.
+    /// Held while a rig is added or deleted, so that saved rigs and those in memory agree.
     changing: Mutex<()>,
     maximum: usize,
     /// `None` if rigs are in memory only.
@@ -59,7 +59,7 @@ impl RigStore {
         self.find(name.strip_prefix(COLLECTION)?)
     }
 
-    /// A hand of a rig of which a request has the name, without its skin.
+    /// A hand of the rig that a request names, without its skin.
     pub(crate) fn rig(&self, name: &str, handedness: Handedness) -> Option<Rig> {
         let stored = self.named(name)?;
         Some((*stored.hand(handedness).hand.rig).clone())
@@ -87,8 +87,8 @@ impl RigStore {
         self.created().insert(id, None);
     }
 
-    /// A hand that is `hundredths` / 100 times as large as a rig's. The last few are kept, so that what searches derive from
-    /// them is not derived for each call.
+    /// A hand that is `hundredths` / 100 times as large as a rig's. The last few are kept, with the data that searches
+    /// derive from them.
     pub(crate) fn scaled(&self, hand: &RigHand, hundredths: u16) -> RigHand {
         self.scaled.get(hand, hundredths)
     }
@@ -111,7 +111,7 @@ impl RigStore {
         self.saved.as_ref()
     }
 
-    /// What is saved of a rig that this request makes. `None` if rigs are in memory only.
+    /// The record of the rig that this request makes. `None` if rigs are in memory only.
     pub(crate) fn record(&self, request: &v1::CreateRigRequest) -> Option<Bytes> {
         let record = |_: &Records| {
             seal(&SavedRig {
@@ -213,14 +213,14 @@ fn built_in(name: &str) -> Option<StoredRig> {
     })
 }
 
-/// Largest record in bytes: a model of the largest size that a server can be configured to take, and what is beside it.
+/// Largest record in bytes: more than the largest model that a server can be configured to take.
 const MAX_RECORD: u64 = 1 << 30;
 
 pub(crate) fn saved_rigs(files: Arc<SavedFiles>) -> Records {
     Records::new(files, RIGS, MAX_RECORD)
 }
 
-/// The request that made a rig. The inner error is what is wrong with its record.
+/// The request that made a rig. The inner error is why its record cannot be read.
 pub(crate) async fn saved_request(
     rigs: &Records,
     id: &str,
@@ -236,7 +236,7 @@ pub(crate) async fn saved_request(
     rigs.read(id, parse).await
 }
 
-/// What a client sent to create a rig.
+/// The record of a rig: the request that created it.
 #[derive(Clone, PartialEq, Message)]
 struct SavedRig {
     /// `None` in records of version 0.1.
@@ -244,7 +244,7 @@ struct SavedRig {
     request: Option<v1::CreateRigRequest>,
 }
 
-/// Where the fields of a record of version 0.1 are in a request now.
+/// The places of a version 0.1 record's fields in a request.
 const REQUEST: &[FieldMove] = &[
     field(1, &[1]),
     field(2, &[2]),

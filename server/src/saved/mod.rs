@@ -1,5 +1,5 @@
-//! The folder or bucket where what clients create is saved: files that are written as a whole and checked when they are read. What is
-//! damaged or missing stays known by its name, and is there again when its file is.
+//! The folder or bucket of created objects and rigs: files that are written as a whole and checked when they are read. An object or
+//! rig whose file is damaged or missing stays known by its name, and is back when its file is.
 
 mod records;
 
@@ -32,7 +32,7 @@ pub(crate) const OBJECTS: &str = "objects";
 pub(crate) const MESHES: &str = "meshes";
 pub(crate) const RIGS: &str = "rigs";
 
-/// A file in a folder that stays when everything else is deleted: without it, the folder is not the one that was written to.
+/// A file in each folder that stays when everything else is deleted: a folder without it is another one.
 const MARK: &str = ".grasp";
 
 const NEEDED: &str = "it must be a folder that only this server writes to, or memory, with which created objects and rigs end with \
@@ -47,13 +47,13 @@ pub(crate) struct SavedFiles {
     place: String,
 }
 
-/// What is saved cannot be used.
+/// The store cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("store is {place}; {reason}")]
 pub struct StoreError {
     /// The folder or bucket.
     pub place: String,
-    /// What is wrong.
+    /// The problem.
     pub reason: String,
 }
 
@@ -121,7 +121,7 @@ impl SavedFiles {
         Ok(sizes)
     }
 
-    /// Writes a file as a whole: it is as it was, or as it is to be.
+    /// Writes a file as a whole: a failure leaves it as it was.
     pub(crate) async fn write(&self, path: &ObjectPath, bytes: Bytes) -> Result<(), Error> {
         self.files.put(path, bytes.into()).await?;
         if let Some(folder) = &self.folder {
@@ -191,7 +191,7 @@ const LOCK_RETRY: Duration = Duration::from_millis(20);
 const FOLDER_MODE: u32 = 0o700;
 const FILE_MODE: u32 = 0o600;
 
-/// In the names of files that `object_store` has yet to move to their place.
+/// Part of the names of files that `object_store` has yet to move to their place.
 const UNFINISHED: char = '#';
 
 /// A folder that only this server uses, as long as this lives.
@@ -202,7 +202,7 @@ struct OwnedFolder {
 }
 
 impl OwnedFolder {
-    /// Creates the folder with these subfolders if necessary, takes it, and removes what interrupted writes left. An error if it
+    /// Creates the folder with these subfolders if necessary, takes it, and removes unfinished files. An error if it
     /// lacks a subfolder that it had, or if another server uses it.
     fn open(path: &Path, subfolders: &[&str]) -> io::Result<Self> {
         let is_new = !path.join(LOCK).exists();
@@ -239,7 +239,7 @@ impl OwnedFolder {
         Ok(folder)
     }
 
-    /// Removes what interrupted writes left, and takes the rest from all other users.
+    /// Removes files of interrupted writes, and makes the others private.
     fn remove_unfinished(&self, subfolder: &str) -> io::Result<()> {
         for entry in fs::read_dir(self.path.join(subfolder))? {
             let entry = entry?;
@@ -263,7 +263,7 @@ impl OwnedFolder {
     }
 }
 
-/// Creates a folder for this user only, with those above it, or takes one that is there from all others.
+/// Creates a private folder with its parents, or makes an existing folder private.
 pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
     let mut builder = DirBuilder::new();
     #[cfg(unix)]
@@ -273,7 +273,7 @@ pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Takes a file from all other users.
+/// Makes a file private.
 pub(crate) fn make_private(file: &Path) {
     set_mode(file, FILE_MODE);
 }
@@ -293,10 +293,10 @@ fn set_mode(path: &Path, mode: u32) {
     }
 }
 
-/// The folder of the default, in that of the user's data.
+/// The default folder, in the user's data folder.
 const DEFAULT_FOLDER: &str = "grasp";
 
-/// What the setting must be.
+/// The valid values of the setting.
 pub(crate) const NEEDED_PLACE: &str = if cfg!(feature = "s3") {
     "memory, a folder, or s3://BUCKET/PREFIX"
 } else {
@@ -341,7 +341,7 @@ impl StorePlace {
         }
     }
 
-    /// Reads `memory`, a folder, or `s3://bucket/prefix`. `None` if it is none of them.
+    /// Reads `memory`, a folder, or `s3://bucket/prefix`. `None` for any other text.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         match text.split_once("://") {
             None if text.is_empty() => None,

@@ -15,7 +15,7 @@ const HASH_BYTES: usize = 32;
 /// Largest file of names, in bytes.
 const MAX_NAMES: u64 = 1 << 30;
 
-/// What is wrong with a record.
+/// Why a record cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unreadable {
     #[error("its file is missing")]
@@ -61,9 +61,9 @@ struct Names {
 
 #[derive(Debug)]
 pub(crate) struct RecordIds {
-    /// All, those of lost records included.
+    /// All ids, those of lost records included.
     pub all: BTreeSet<String>,
-    /// Those in the file of names.
+    /// The ids in the file of names.
     pub known: BTreeSet<String>,
     /// Number of files of records.
     pub files: usize,
@@ -77,7 +77,7 @@ pub(crate) struct NotCreated {
 }
 
 impl Records {
-    /// Of up to `max_bytes` each.
+    /// Records of up to `max_bytes` each.
     pub(crate) fn new(files: Arc<SavedFiles>, folder: &'static str, max_bytes: u64) -> Self {
         Self {
             files,
@@ -110,7 +110,7 @@ impl Records {
         written.map_err(|error| self.error(&error))
     }
 
-    /// Reads a record, and makes something of its message. The inner error is what is wrong with the record.
+    /// Reads a record, and parses its message. The inner error is why the record cannot be read.
     pub(crate) async fn read<T>(
         &self,
         id: &str,
@@ -132,7 +132,7 @@ impl Records {
         }
         let Err(error) = written else { return Ok(()) };
         log_failure(&error);
-        // What a write that failed late left must not come back at the next start.
+        // A write that failed late may have left a file, which must not come back at the next start.
         let undone = self.files.delete(&self.path(id)).await;
         let is_undone = undone.inspect_err(log_failure).is_ok();
         Err(NotCreated { is_undone })
@@ -187,12 +187,12 @@ impl Records {
     }
 }
 
-/// Where a field of an old message is now.
+/// The new place of a field of an old message.
 #[derive(Debug)]
 pub(crate) struct FieldMove {
-    /// Its old number. If there are several of a number, they are for its first value, its second and so on.
+    /// Its old number. Several moves of one number are for its first value, its second and so on.
     old: usize,
-    /// The numbers of the messages that it is in now, and its own. Empty: its fields are of the whole message.
+    /// Its new path: the numbers of the enclosing messages, and its own. Empty: its fields become fields of the whole message.
     now: &'static [usize],
     /// Its own fields, if they moved.
     fields: &'static [FieldMove],
@@ -206,7 +206,7 @@ pub(crate) const fn message(old: usize, now: &'static [usize], fields: &'static 
     FieldMove { old, now, fields }
 }
 
-/// A message with its fields where they are now. `None` if it is no message.
+/// A message with its fields in their new places. `None` if it is not a message.
 pub(crate) fn move_fields(mut old: &[u8], moves: &[FieldMove]) -> Option<Vec<u8>> {
     let (mut now, mut numbers) = (Vec::new(), Vec::new());
     while !old.is_empty() {

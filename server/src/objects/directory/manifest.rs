@@ -1,6 +1,6 @@
-//! `NAME.toml`: what a client gives of a `GraspObject`, under the same names.
+//! `NAME.toml`: the fields of a `GraspObject` that clients set, under the same names.
 //!
-//! Each function that reads a value adds what is wrong with it to the violations of its field, and returns `None` then.
+//! Each function that reads a value adds its problems to the violations of its field, and returns `None` then.
 
 use std::cell::RefCell;
 
@@ -12,7 +12,7 @@ use crate::{
     validate::{Field, Labels, Violations, quoted},
 };
 
-/// What hands do with a region, and what becomes of a grip.
+/// The preferences that a region and a grip can have.
 const REGION_PREFERENCES: &[&str] = &["preferred", "avoided", "forbidden"];
 const GRIP_PREFERENCES: &[&str] = &["preferred", "forbidden"];
 
@@ -48,11 +48,11 @@ const HANDS: &[&str] = &["left", "right"];
 /// The conventions in which a wrist may be given.
 const CONVENTIONS: &[&str] = &["openxr", "unity", "unreal", "godot", "unity_flip_x", "unreal_xzy"];
 
-/// Mass in kilograms for further checks if none is given; no object gets it.
+/// Mass in kilograms for further checks of a manifest without one; no object gets it.
 const PLACEHOLDER_MASS: f32 = 1.0;
 
-/// Reads the manifest of the object with this id key by key, to report everything that is wrong with it. Its values are not checked. None
-/// if it is not TOML.
+/// Reads the manifest of the object with this id key by key, to report all problems at once. Its values are not checked.
+/// `None` if it is not TOML.
 pub(super) fn read_manifest(id: &str, bytes: &[u8], violations: &Violations) -> Option<v1::GraspObject> {
     let whole = violations.field("");
     let text = std::str::from_utf8(bytes);
@@ -91,7 +91,7 @@ struct Keys<'a> {
     parent: Option<Field<'a>>,
     table: &'a Table,
     violations: &'a Violations,
-    /// Those that were looked up.
+    /// The keys that were looked up.
     known: RefCell<Vec<&'static str>>,
 }
 
@@ -198,10 +198,10 @@ impl At<'_> {
         name.or_else(|| self.reject(&listed(words)))
     }
 
-    /// A table that has none but the keys that `read` looks up, and nothing wrong in it.
+    /// A table with only keys that `read` looks up, and only valid values.
     fn table<T>(self, read: impl FnOnce(&Keys<'_>) -> T) -> Option<T> {
         let Some(table) = self.value.as_table() else {
-            // It would be one with the keys that `read` looks up.
+            // An empty table shows which keys `read` looks up.
             let (table, ignored) = (Table::new(), Violations::default());
             let keys = Keys::of(None, &table, &ignored);
             read(&keys);
@@ -215,7 +215,7 @@ impl At<'_> {
         (violations.len() == before).then_some(read)
     }
 
-    /// All elements, if all are right.
+    /// All elements, if all are valid.
     fn elements<T>(self, values: &[Value], mut read: impl FnMut(At<'_>) -> Option<T>) -> Option<Vec<T>> {
         let elements = values.iter().enumerate().filter_map(|(place, value)| {
             read(At {
@@ -321,7 +321,7 @@ fn shape(at: At<'_>) -> Option<v1::Shape> {
         return at.reject(&format!("a table with one of {}", listed(&kinds)));
     };
     let field = at.field.child(name);
-    // What is absent, and must not be, is reported with the checks of the request.
+    // Missing fields are reported with the checks of the request.
     At { field, value }.table(|keys| v1::Shape {
         kind: Some(kind(keys)),
     })

@@ -50,7 +50,7 @@ pub struct DirectoryProblem {
     pub file: String,
     /// The key of the manifest, or `mesh` for the mesh; empty for the file itself.
     pub field: String,
-    /// The value, and what a valid one is.
+    /// The value, and the valid ones.
     pub description: String,
 }
 
@@ -65,13 +65,13 @@ impl fmt::Display for DirectoryProblem {
     }
 }
 
-/// An unusable folder of objects, with everything that is wrong.
+/// An unusable folder of objects, with all of its problems.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("objects_directory is {}; {}", path.display(), listed(problems))]
 pub struct DirectoryError {
     /// The folder.
     pub path: PathBuf,
-    /// What is wrong, file by file.
+    /// The problems, file by file.
     pub problems: Vec<DirectoryProblem>,
 }
 
@@ -85,7 +85,7 @@ fn listed(problems: &[DirectoryProblem]) -> String {
     listed.chain(more).collect::<Vec<_>>().join("\n")
 }
 
-/// What is wrong so far.
+/// The problems found so far.
 #[derive(Default)]
 struct Problems(Vec<DirectoryProblem>);
 
@@ -178,14 +178,14 @@ pub(crate) fn load(
 pub struct FolderObject {
     /// The mesh file.
     pub mesh: PathBuf,
-    /// What the manifest next to it says of the object, as yet unchecked. `None` if there is no manifest.
+    /// The object as its manifest describes it, unchecked. `None` if there is no manifest.
     pub manifest: Option<v1::GraspObject>,
 }
 
 /// Finds the meshes of a folder and reads the manifests that are next to them, as the server reads its `objects_directory`.
 ///
 /// # Errors
-/// Everything that is wrong with the folder and with manifests.
+/// All problems of the folder and of manifests.
 pub fn objects_of_folder(path: &Path) -> Result<Vec<FolderObject>, Vec<DirectoryProblem>> {
     let mut problems = Problems::default();
     let mut objects = Vec::new();
@@ -208,7 +208,7 @@ pub fn objects_of_folder(path: &Path) -> Result<Vec<FolderObject>, Vec<Directory
     problems.finish(objects)
 }
 
-/// Reads one object. `None` if something is wrong with it.
+/// Reads one object. `None` if it has problems.
 fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits, problems: &mut Problems) -> Option<PinnedObject> {
     let before = problems.0.len();
     if !pair.has_manifest {

@@ -4,8 +4,8 @@
 //! is written before the first record that names it, and deleted after the last; each write replaces a file as a
 //! whole. So a crash leaves every object whole or absent, and at worst a mesh without a record, which the next start removes.
 //!
-//! What is read is compared with its SHA-256. What does not match is never served, and stays where it is for people to look at or
-//! to replace. The names of all objects are in a file of their own, so that a lost record is missed.
+//! Every file is compared with its SHA-256 when it is read. One that does not match is never served, and stays for people to
+//! inspect or replace. The names of all objects are in a file of their own, so that a lost record is missed.
 
 #[cfg(test)]
 mod tests;
@@ -37,7 +37,7 @@ use crate::{
     wire::hex,
 };
 
-/// Largest record in bytes: what a client gives, and what describes the object, which repeats none of the lists.
+/// Largest record in bytes.
 const MAX_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
 
 /// Records that are read at a time at the start.
@@ -62,11 +62,11 @@ pub(crate) struct SavedObjects {
     pub loads: Arc<Semaphore>,
     /// Permits for the bytes of their mesh files.
     load_bytes: Arc<Semaphore>,
-    /// One permit: who waits for changes to end waits for their turn here, where they take no thread. The disk needs some.
+    /// One permit: calls that wait for changes to end queue for it, so that only one of them blocks a thread.
     pub turn: Arc<Semaphore>,
 }
 
-/// What was found at the start.
+/// The records found at the start.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
     /// The records by id, without regions and known grips; `None` if damaged or missing.
@@ -78,7 +78,7 @@ pub(crate) struct Found {
 pub(crate) type MeshUses = HashMap<MeshHash, usize>;
 
 impl SavedObjects {
-    /// At most `maximum`, of which so many are loaded at a time, with mesh files of `limits.bytes` together and thus each.
+    /// Up to `maximum` objects. Those that are loaded at a time have mesh files of at most `limits.bytes` together.
     pub(crate) fn new(
         files: Arc<SavedFiles>,
         maximum: NonZeroUsize,
@@ -169,14 +169,14 @@ impl SavedObjects {
         self.records.write(saved.id(), seal(saved)).await
     }
 
-    /// Deletes a mesh that no record names any more. If that fails, the next start does it.
+    /// Deletes a mesh that no record names. If that fails, the next start does it.
     pub(crate) async fn delete_mesh(&self, hash: &MeshHash) {
         if let Err(error) = self.files.delete(&mesh_path(hash)).await {
             tracing::warn!(mesh = hex(hash), %error, "cannot delete the mesh of a deleted object");
         }
     }
 
-    /// The record of an object. The inner error is what is wrong with it.
+    /// The record of an object. The inner error is why it cannot be read.
     pub(crate) async fn record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, Error> {
         let parse = |message: &[u8]| SavedObject::from_message(id, message);
         self.records.read(id, parse).await
@@ -282,7 +282,7 @@ impl SavedObject {
         }
     }
 
-    /// Labels, etag and times. `None` if the times are none.
+    /// Labels, etag and times. `None` without valid times.
     pub(crate) fn record(&self) -> Option<Record> {
         Some(Record {
             labels: self.object.labels.clone(),
@@ -292,14 +292,14 @@ impl SavedObject {
         })
     }
 
-    /// What is kept of it while its object is at rest: no regions and known grips, which may be long.
+    /// The part kept while its object is at rest: without regions and known grips, which may be long.
     pub(crate) fn without_lists(mut self) -> Self {
         self.object.regions = Vec::new();
         self.object.known_grips = Vec::new();
         self
     }
 
-    /// What identifies the request that created it, if it had an id.
+    /// Identifies the request that created it, if it had an id.
     pub(crate) fn request_key(&self) -> Option<RequestKey> {
         Some(RequestKey {
             id: Uuid::from_slice(&self.request_id).ok()?,
@@ -309,7 +309,7 @@ impl SavedObject {
 
     /// SHA-256 of the mesh file.
     pub(crate) fn mesh_hash(&self) -> MeshHash {
-        // Of any other length only in messages that are refused.
+        // Only refused messages have another length.
         self.mesh_sha256.as_slice().try_into().unwrap_or_default()
     }
 
@@ -334,7 +334,7 @@ impl SavedObject {
     }
 }
 
-/// Logs what of an object cannot be read.
+/// Logs why a saved object cannot be read.
 pub(crate) fn log_damage(id: &str, reason: &dyn fmt::Display) {
     tracing::error!(object = name_of(id), %reason, "what was saved of an object is damaged");
 }

@@ -298,7 +298,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     prop::collection::vec(step, 1..25)
 }
 
-/// What the map knows of an object: its description.
+/// The map's value for an object: its description.
 type Model = BTreeMap<&'static str, v1::GraspObject>;
 
 fn check(objects: &Objects, model: &Model) -> Result<(), TestCaseError> {

@@ -1,4 +1,4 @@
-//! Records as version 0.1 wrote them, which are read, but not written: most of their fields are in others' places now.
+//! Records of version 0.1, which are read, but not written: most of their fields have other numbers.
 
 use grasp_proto::v1;
 use prost::Message;
@@ -87,7 +87,7 @@ const GRIP: &[FieldMove] = &[
     field(15, &[3, 10]),
 ];
 
-/// The fields that are in no other's place now.
+/// The fields without an equivalent in present records.
 #[derive(Clone, PartialEq, Message)]
 struct OldRecord {
     #[prost(message, required, tag = "1")]
@@ -130,7 +130,7 @@ pub(super) fn read(record: &[u8]) -> Option<(v1::GraspObject, Option<v1::Vector3
     let origin = found.origin_in_file.map(|Origin { x, y, z }| vec![x, y, z]);
     object.origin_in_file = origin.unwrap_or_default();
     for region in &mut object.regions {
-        // What is preferred and what is forbidden had each other's numbers.
+        // `PREFERRED` and `FORBIDDEN` had each other's numbers.
         region.preference = if region.preference == 0 {
             0
         } else {

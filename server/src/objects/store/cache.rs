@@ -1,7 +1,7 @@
-//! The cache: objects at rest, what is made from them for searches, and their atlases, within one bound.
+//! The cache: created objects, their derived data, and their atlases, within one bound.
 //!
-//! When something does not fit, what can be made again goes first: what is derived from objects and objects at other sizes, the least
-//! recently used first, and then atlases, those in least demand first. After them go created objects, the least recently used first.
+//! When something does not fit, data that can be made again goes first: derived data and objects at other sizes, the least recently
+//! used first, and then atlases, those in least demand first. After them go created objects, the least recently used first.
 //! Nothing that a call uses goes.
 
 use std::sync::{Arc, OnceLock, Weak};
@@ -19,8 +19,7 @@ use crate::{
 /// Largest number of kept sizes of an object. With more in turn, each call prepares the object again.
 pub(super) const SIZES_PER_OBJECT: usize = 8;
 
-/// Largest number of objects for which what is derived is kept although no call requested it: the newest ones, whose first calls are
-/// likely soon. More make those calls faster when thousands of objects are created at once, and take their memory.
+/// Largest number of objects whose derived data is kept although no call requested it: the newest, needed soon.
 pub(super) const KEPT_AHEAD: usize = 32;
 
 /// Where an object at another size is kept once it is prepared.
@@ -35,10 +34,9 @@ pub(crate) enum Need {
 
 #[derive(Clone, Debug)]
 enum Product {
-    /// What searches need of it.
     Derived,
     Size(ObjectSize, SizeSlot),
-    /// The atlas for a hand, and what was learned.
+    /// The atlas for a hand, and the learned grips.
     Atlas(Arc<Hand>),
 }
 
@@ -108,7 +106,7 @@ impl Item {
     }
 }
 
-/// What can be made again, in the order in which it was added.
+/// Data that can be made again, in the order in which it was added.
 #[derive(Debug, Default)]
 pub(super) struct Cache {
     items: Vec<Item>,
@@ -133,7 +131,7 @@ impl Cache {
         self.items.retain(stays);
     }
 
-    /// Forgets what was made from an object that is changed or gone.
+    /// Forgets the items of an object that is changed or gone.
     pub(super) fn forget(&mut self, object: &StoredObject) {
         self.retain(|item| !item.is_of(object));
     }
@@ -161,7 +159,7 @@ impl Cache {
         true
     }
 
-    /// Drops the oldest of what is derived and nobody requested if there is too much of it.
+    /// Drops the oldest derived data that no call requested if there is too much of it.
     fn drop_oldest_ahead(&mut self) {
         let is_ahead = |item: &Item| matches!(item.product, Product::Derived) && item.last_used == 0;
         let ahead = self.items.iter().filter(|item| is_ahead(item)).count();
@@ -171,7 +169,7 @@ impl Cache {
     }
 }
 
-/// Room in the cache for what is about to be added.
+/// Room in the cache for an object that is about to be added.
 #[must_use = "reserved room is lost until it is released"]
 pub(super) struct Reserved {
     bytes: usize,
@@ -179,7 +177,7 @@ pub(super) struct Reserved {
 }
 
 impl Reserved {
-    /// Gives the room back, so that what was added can be counted.
+    /// Gives the room back, so that the added object can be counted.
     pub(super) fn release(self, created: &mut Created) {
         created.bytes -= self.bytes;
         created.loaded -= self.objects;
@@ -187,7 +185,7 @@ impl Reserved {
 }
 
 impl ObjectStore {
-    /// Makes room for a new object or, if there is one, for that which `grows`, and keeps it until it is released.
+    /// Makes room for a new object or for more bytes of the object `grows`, and keeps it until it is released.
     pub(super) fn reserve(
         &self,
         created: &mut Created,
@@ -207,8 +205,7 @@ impl ObjectStore {
         Ok(Reserved { bytes, objects })
     }
 
-    /// Makes room for so many more bytes and objects that a call needs: all that is not in use goes but the object with the id
-    /// `kept`.
+    /// Makes room for more bytes and objects of a call: anything may go that is not in use but the object with the id `kept`.
     fn make_room(
         &self,
         created: &mut Created,
@@ -229,7 +226,7 @@ impl ObjectStore {
         }
     }
 
-    /// Makes room for something in this demand by what can be made again, if that is enough. False if it is not.
+    /// Makes room for an atlas in this demand by dropping data that can be made again. False if that is not enough.
     fn make_room_ahead(&self, created: &mut Created, demand: Demand, bytes: usize) -> bool {
         created.cache.retain(Item::is_there);
         if !self.has_room(created, demand, bytes) {
@@ -265,7 +262,7 @@ impl ObjectStore {
         format!("takes about {bytes} bytes with the object's search structures; the cache holds {most}")
     }
 
-    /// Checks that a new object fits in the cache with what will be derived from it.
+    /// Checks that a new object fits in the cache with its derived data.
     pub(crate) fn check_size(&self, object: &StoredObject) -> Result<(), ServiceError> {
         let whole = object.derived_and_own_bytes();
         if whole > self.limits.bytes {
@@ -274,7 +271,7 @@ impl ObjectStore {
         Ok(())
     }
 
-    /// What was derived from an object, if it is kept.
+    /// The derived data of an object, if it is kept.
     pub(crate) fn kept(&self, object: &Arc<StoredObject>, need: Need) -> Option<Arc<Derived>> {
         let kept = object.derived.get()?;
         if need == Need::Call {
@@ -287,12 +284,12 @@ impl ObjectStore {
         Some(kept)
     }
 
-    /// What is derived from an object, built if necessary, in which case less needed makes room. What nobody requested is kept only if
-    /// there is room. An object that the server started with keeps it outside of the cache.
+    /// The derived data of an object, built if necessary, in which case less needed data makes room. Built ahead, it is kept only
+    /// if there is room. An object that the server started with keeps it outside of the cache.
     ///
     /// # Errors
-    /// [`ServiceError::ObjectUnloadable`] if it takes more than the whole cache, [`ServiceError::Overloaded`] if what would have to make
-    /// room is in use, [`ServiceError::Cancelled`].
+    /// [`ServiceError::ObjectUnloadable`] if it takes more than the whole cache, [`ServiceError::Overloaded`] if everything that
+    /// could make room is in use, [`ServiceError::Cancelled`].
     pub(crate) fn derived(
         &self,
         object: &Arc<StoredObject>,
@@ -353,7 +350,7 @@ impl ObjectStore {
         Ok(())
     }
 
-    /// Number of created objects for which what is derived is kept.
+    /// Number of created objects whose derived data is kept.
     pub(crate) fn prepared(&self) -> usize {
         let created = self.created();
         let items = created.cache.items.iter();
@@ -399,7 +396,7 @@ impl ObjectStore {
         Ok(new)
     }
 
-    /// Changes what is known of how a hand can hold an object, if there is room. False, and nothing is changed or evicted, if there is not.
+    /// Changes the known grips of an object and a hand if there is room. Otherwise returns false, and changes and evicts nothing.
     pub(crate) fn change_atlas(
         &self,
         object: &Arc<StoredObject>,
@@ -433,7 +430,7 @@ impl ObjectStore {
         self.has_room(&created, slot.demand, bytes.saturating_sub(slot.bytes()))
     }
 
-    /// Gives a changed object what is known of the object that it replaces.
+    /// Gives a changed object the known grips of the object that it replaces.
     pub(crate) fn hand_over_atlas(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, slot: Slot) {
         let mut created = self.created();
         if slot.bytes() > 0 {

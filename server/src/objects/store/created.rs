@@ -1,4 +1,4 @@
-//! The objects that clients created, and what is in memory of them.
+//! The objects that clients created, in memory or at rest.
 
 use std::{
     collections::{BTreeMap, HashMap, VecDeque},

@@ -25,7 +25,7 @@ use crate::{
     validate::{Labels, ObjectChange, Violations, saved_object_fields},
 };
 
-/// The object, or none if it was replaced or deleted meanwhile.
+/// The object; `None` if it was replaced or deleted meanwhile.
 type Outcome = Result<Option<Revision>, ServiceError>;
 
 /// An object that is being loaded, as long as a call waits for it.
@@ -106,8 +106,7 @@ impl ObjectStore {
         }
     }
 
-    /// Finds out why something of an object could not be read when it had this etag: it may have been changed meanwhile, in which case
-    /// this returns, or deleted.
+    /// The error of an object with this etag that could not be read. No error if the object was changed meanwhile.
     async fn blame(
         self: &Arc<Self>,
         id: &str,
@@ -123,7 +122,7 @@ impl ObjectStore {
         Err(ServiceError::ObjectDamaged { name: name_of(id) })
     }
 
-    /// Does something once every change that has begun has ended.
+    /// Runs `work` once all changes in progress have ended.
     async fn undisturbed<T: Send + 'static>(
         self: &Arc<Self>,
         work: impl FnOnce(&Self, &mut MeshUses) -> T + Send + 'static,
@@ -142,7 +141,7 @@ impl ObjectStore {
     ///
     /// # Errors
     /// [`ServiceError::ObjectNotFound`]; [`ServiceError::ObjectDamaged`], [`ServiceError::ObjectUnloadable`] and
-    /// [`ServiceError::StoreFailed`] if it cannot be loaded; [`ServiceError::Overloaded`] if what would have to make room is in use.
+    /// [`ServiceError::StoreFailed`] if it cannot be loaded; [`ServiceError::Overloaded`] if the full cache is in use.
     pub(crate) async fn loaded(self: &Arc<Self>, id: &str) -> Result<Revision, ServiceError> {
         loop {
             let loaded = match self.get(id)?.loaded() {
@@ -167,7 +166,7 @@ impl ObjectStore {
         let store = Arc::clone(self);
         let of = Arc::clone(&resting);
         let loading = async move { store.load_now(&of).await }.boxed().shared();
-        // Only one that has ended cannot be downgraded, and this one has yet to start.
+        // Downgrading fails only once a future has ended, and this one has yet to start.
         if let Some(weak) = loading.downgrade() {
             created.loads.push(Load {
                 resting,
@@ -183,7 +182,7 @@ impl ObjectStore {
         let mut created = self.created();
         let state = created.objects.get(id).map(|entry| entry.state.clone());
         let is_same = |state: &Listed| matches!(&state.body, Body::AtRest(now) if Arc::ptr_eq(now, resting));
-        // What went wrong with a state that is no more is no error of the present one.
+        // An error of a replaced state is not one of the present state.
         let Some(mut state) = state.filter(is_same) else {
             return Ok(None);
         };
@@ -221,7 +220,7 @@ impl ObjectStore {
         }
     }
 
-    /// The same. `None` if its mesh is missing or not the one that its record names.
+    /// One attempt at that. `None` if its mesh is missing or does not match its record.
     async fn try_read_and_build(
         self: &Arc<Self>,
         id: &str,
@@ -248,7 +247,7 @@ impl ObjectStore {
             build_object(&fields, limits, violations, stop).map(Some)
         });
         match built.await? {
-            // Its request was valid under the limits of its time.
+            // Its request was valid under the limits at its creation.
             Err(error @ ServiceError::Invalid(_)) if change.is_none() => {
                 let (name, reason) = (name_of(id), error.to_string());
                 Err(ServiceError::ObjectUnloadable { name, reason })

@@ -1,7 +1,7 @@
 //! Objects by name. Built-in ones and those of the objects directory stay as they are; created ones can be changed and
 //! deleted.
 //!
-//! Created objects make room in the [`cache`] for others. If objects are saved, they are put to rest: only what describes them stays
+//! Created objects make room in the [`cache`] for others. If objects are saved, they are put to rest: only their description stays
 //! in memory, and they are loaded again when a call needs them. Otherwise they are evicted, and the error for an evicted object says
 //! so, so that its client creates it again.
 //!
@@ -51,7 +51,7 @@ const RETRY_AFTER: Duration = Duration::from_secs(1);
 pub(crate) struct ObjectStore {
     /// Objects that the server started with; never changed or evicted.
     pinned: BTreeMap<String, Listed>,
-    /// Held while an object is added, changed or deleted, so that what is saved and what is in memory agree.
+    /// Held while an object is added, changed or deleted, so that saved objects and those in memory agree.
     mesh_uses: Mutex<MeshUses>,
     created: Mutex<Created>,
     limits: StoreLimits,
@@ -59,11 +59,11 @@ pub(crate) struct ObjectStore {
     saved: Option<SavedObjects>,
 }
 
-/// What comes with a new object.
+/// Data that comes with a new object.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Origin {
     pub labels: Labels,
-    /// What identifies the request, if it may be repeated.
+    /// Identifies the request, if it may be repeated.
     pub request: Option<RequestKey>,
     /// The mesh file.
     pub mesh: Bytes,
@@ -158,7 +158,7 @@ impl ObjectStore {
     ///
     /// # Errors
     /// Those of [`Self::repeated`], [`ServiceError::Invalid`] if it is larger than the whole cache, [`ServiceError::Overloaded`] if
-    /// what would have to make room is in use, [`ServiceError::ObjectsFull`], and [`ServiceError::StoreFailed`].
+    /// everything that could make room is in use, [`ServiceError::ObjectsFull`], and [`ServiceError::StoreFailed`].
     pub(crate) fn insert(&self, object: StoredObject, origin: Origin) -> Result<Listed, ServiceError> {
         let mut mesh_uses = self.changing();
         let reserved;

@@ -163,7 +163,7 @@ impl ObjectStore {
         (created.bytes, created.loaded) == (bytes, loaded)
     }
 
-    /// Drops what can be made again until no more than `bytes` are taken.
+    /// Drops data that can be made again until no more than `bytes` are taken.
     pub(crate) fn shrink_to(&self, bytes: usize) {
         let mut created = self.created();
         created.cache.retain(Item::is_there);
@@ -175,7 +175,7 @@ fn store_of(bytes: usize) -> ObjectStore {
     ObjectStore::new(StoreLimits { objects: 100, bytes }, Vec::new(), None)
 }
 
-/// A store with room for so many tetrahedra, with what is derived from them.
+/// A store with room for so many tetrahedra, with their derived data.
 fn roomy(tetrahedra: usize) -> ObjectStore {
     store_of(tetrahedra * tetrahedron("any", 1.0, &[]).derived_and_own_bytes())
 }
@@ -185,7 +185,7 @@ fn inserted(store: &ObjectStore, object: StoredObject) -> Arc<StoredObject> {
     Arc::clone(created.object().expect("it is loaded"))
 }
 
-/// A created object whose content is its own.
+/// A created object with unique content.
 fn insert_numbered(store: &ObjectStore, number: u16) -> Arc<StoredObject> {
     let edge = 0.02 + 1e-4 * f32::from(number);
     inserted(store, tetrahedron(&format!("o{number}"), edge, &[]))
@@ -217,7 +217,7 @@ fn an_object_at_rest_takes_little_more_than_its_mesh() {
 }
 
 #[test]
-fn what_is_derived_is_built_once_and_counts_until_it_is_dropped() {
+fn derived_data_is_built_once_and_counts_until_it_is_dropped() {
     let store = store_of(1 << 30);
     let a = insert_numbered(&store, 0);
     let at_rest = store.created().taken();
@@ -230,14 +230,14 @@ fn what_is_derived_is_built_once_and_counts_until_it_is_dropped() {
 }
 
 #[test]
-fn what_was_used_least_recently_is_dropped_before_any_object() {
+fn the_least_recently_used_data_is_dropped_before_any_object() {
     let any = Arc::new(tetrahedron("any", 0.02, &[]));
     let bytes = derive(&store_of(1 << 30), &any, Need::Call).bytes();
     let store = store_of(5 * bytes / 2);
     let [a, b, c, d] = [0, 1, 2, 3].map(|number| insert_numbered(&store, number));
     drop(derive(&store, &a, Need::Call));
     drop(derive(&store, &b, Need::Call));
-    // What nobody requested goes first.
+    // Data that no call requested goes first.
     drop(derive(&store, &a, Need::Call));
     drop(derive(&store, &c, Need::Ahead));
     assert_eq!([&a, &b, &c].map(|object| is_kept(object)), [true, false, true]);
@@ -250,7 +250,7 @@ fn what_was_used_least_recently_is_dropped_before_any_object() {
 }
 
 #[test]
-fn only_the_newest_are_kept_that_nobody_requested() {
+fn of_unrequested_data_only_the_newest_is_kept() {
     let store = store_of(1 << 30);
     let numbers = 0..KEPT_AHEAD as u16 + 3;
     let objects: Vec<_> = numbers.map(|number| insert_numbered(&store, number)).collect();
@@ -264,7 +264,7 @@ fn only_the_newest_are_kept_that_nobody_requested() {
 }
 
 #[test]
-fn objects_of_one_content_share_what_is_derived() {
+fn objects_of_one_content_share_derived_data() {
     let store = store_of(1 << 30);
     let [a, b] = ["a", "b"].map(|id| inserted(&store, tetrahedron(id, 0.05, &[])));
     let [of_a, of_b] = [&a, &b].map(|object| derive(&store, object, Need::Call));
@@ -305,7 +305,7 @@ fn sizes_count_and_make_room_before_objects_do() {
     inserted(&store, tetrahedron("b", 1.0, &[]));
     assert!(store.contains("a") && store.contains("b"));
     assert_eq!(taken(), 2 * at_rest + sized);
-    // Whatever is of an object goes with it.
+    // All data of an object goes with it.
     store.remove("a", None).unwrap();
     assert_eq!(taken(), at_rest);
 }

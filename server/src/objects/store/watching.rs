@@ -1,6 +1,6 @@
-//! Watchers of the store, and what has yet to be reported to each.
+//! Watchers of the store, and the events that have yet to be reported to each.
 //!
-//! A watcher has no queue of messages but, per object, the set of what happened since the last report: however slowly it
+//! A watcher has no queue of messages but, per object, the set of events since the last report: however slowly it
 //! reads, it gets every object's latest state, and takes no more memory than its limit allows. Events are recorded, and reported
 //! with the state that they led to, under the lock of the created objects: no watcher misses one or sees a state before its event.
 
@@ -23,8 +23,7 @@ use crate::{
 /// Largest number of objects that have yet to be reported to a watcher. One that falls behind further is ended.
 const MAX_PENDING: usize = 2048;
 
-/// What happened to an object, in the order in which it is reported: what was deleted may be created again before the next
-/// report.
+/// An event of an object, in the order of reports: a deleted object may be created again before the next report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Event {
     /// It was there when the watch began.
@@ -43,14 +42,14 @@ pub(crate) enum Event {
     AtlasComplete(Handedness),
 }
 
-/// What is reported to a watcher next.
+/// A report to a watcher.
 #[derive(Debug)]
 pub(crate) enum Report {
     /// All objects that were present have been reported.
     PresentEnd,
     Object {
         id: String,
-        /// What happened, at least one event.
+        /// At least one event.
         events: BTreeSet<Event>,
         /// Its state. `None` if it is gone.
         state: Option<Listed>,
@@ -71,7 +70,7 @@ struct State {
     present: Option<String>,
     /// Ids in the order in which they are reported, each once.
     order: VecDeque<String>,
-    /// Unreported events of the ids in `order`; none are left if they cancelled each other out.
+    /// Unreported events of the ids in `order`; empty if they cancelled each other out.
     events: BTreeMap<String, BTreeSet<Event>>,
     has_overflown: bool,
 }
@@ -88,7 +87,7 @@ impl Watcher {
         }
     }
 
-    /// Records an event of an object whose labels were `before` and are `after`. `None` if it was or is not there.
+    /// Records an event of an object whose labels were `before` and are `after`. `None` if it did not or does not exist.
     fn record(&self, id: &str, event: Event, before: Option<&Labels>, after: Option<&Labels>) {
         let matches = |labels: Option<&Labels>| labels.is_some_and(|labels| self.filter.matches(id, labels));
         let event = match (matches(before), matches(after)) {
@@ -109,7 +108,7 @@ impl Watcher {
 
 impl State {
     fn record(&mut self, id: &str, event: Event) {
-        // What the list of present objects has yet to come to will be reported as it is then.
+        // Objects that the list of present ones has yet to reach will be reported in their state then.
         let is_ahead = self.present.as_ref().is_some_and(|last| last.as_str() < id);
         if self.has_overflown || is_ahead {
             return;
@@ -143,7 +142,7 @@ impl State {
 /// Adds an event to those before it.
 fn combine(events: &mut BTreeSet<Event>, event: Event) {
     if matches!(event, Event::Deleted | Event::Evicted) {
-        // What was not reported need not be, unless another object had the name before.
+        // Unreported events are dropped, but for the deletion of an earlier object of this name.
         let is_new = events.contains(&Event::Created);
         events.retain(|before| is_new && matches!(before, Event::Deleted | Event::Evicted));
         if !is_new {
@@ -155,7 +154,7 @@ fn combine(events: &mut BTreeSet<Event>, event: Event) {
 }
 
 impl ObjectStore {
-    /// A watcher of what happens from now on.
+    /// A watcher of events from this moment on.
     pub(crate) fn watch(&self, query: WatchQuery, most: usize) -> Result<Arc<Watcher>, ServiceError> {
         let mut created = self.created();
         created.watchers.retain(|watcher| watcher.strong_count() > 0);
@@ -171,7 +170,7 @@ impl ObjectStore {
         Ok(watcher)
     }
 
-    /// What is reported to the watcher next. `None` if there is nothing yet.
+    /// The next report to the watcher. `None` if there is nothing yet.
     pub(crate) fn next_report(&self, watcher: &Watcher) -> Result<Option<Report>, ServiceError> {
         let created = self.created();
         let mut unreported = watcher.state();

@@ -1,4 +1,4 @@
-//! What is damaged, missing or open to others in the folder of saved objects.
+//! Files of saved objects that are damaged, missing or open to other users.
 
 use super::*;
 
@@ -134,7 +134,7 @@ fn folders_and_files_are_private_to_their_user() {
     };
     check();
     drop(objects);
-    // So is what an earlier version wrote.
+    // So are files of an earlier version.
     for open in ["", OBJECTS, "objects/a"] {
         let path = folder.path.join(open);
         let mode = if path.is_dir() { 0o755 } else { 0o644 };
