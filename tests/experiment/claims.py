@@ -1,4 +1,4 @@
-"""What chapter 5 says, against a run."""
+"""Statements of chapter 5, against a run."""
 
 import math
 from dataclasses import dataclass

@@ -127,7 +127,7 @@ def draw_steps(run):
 
 
 def drawn_placements(run, name):
-    """All placements, or so many per holdout that there are as many failed ones as in the thesis."""
+    """The first placements of each holdout, at most MAX_DOTS in all."""
     both = run.both(name)
     return both[both.number < MAX_DOTS // len(run.holdouts)]
 

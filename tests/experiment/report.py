@@ -1,4 +1,4 @@
-"""Makes a report of a run of grasp-experiment: figures and tables of chapter 5 beside the thesis', and what chapter 5 says
+"""Makes a report of a run of grasp-experiment: figures and tables of chapter 5 beside the thesis', and its statements
 against the run.
 
     report.py RUN REPORT

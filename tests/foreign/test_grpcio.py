@@ -1,5 +1,5 @@
-"""Calls the service through grpcio, which wraps gRPC's C++ implementation, also with the WebXR input profiles' generic hand as a rig: a
-model that nobody here made."""
+"""Calls the service through grpcio, which wraps gRPC's C++ implementation, also with the WebXR input profiles' generic hand as a rig, a
+model by others."""
 
 import hashlib
 import json
@@ -150,7 +150,7 @@ def test_a_repeated_request_answers_the_object_it_created(objects):
     assert -1 <= age < 300
 
 
-def test_updates_what_the_mask_names_and_deletes(objects):
+def test_updates_masked_fields_and_deletes(objects):
     created = objects.CreateObject(box("changing", friction=0.9))
     change = object_service_pb2.GraspObject(
         name=created.name, mass_kg=0.2, labels={"level": "cellar"}, etag=created.etag

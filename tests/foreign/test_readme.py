@@ -20,7 +20,7 @@ from conftest import ROOT, start_server, stop_server
 DEFAULT_HOST, DEFAULT_PORT = "::1", 50051
 PAGES = ["README.md", "proto/CALLS.md", "client/README.md", "server/HANDS.md"]
 START_SERVER = "cargo run --release -p grasp-server"
-# What grpcurl exits with at a call's deadline.
+# Exit code of grpcurl at a call's deadline.
 DEADLINE_EXCEEDED = 64 + 4
 # Commands that take long and seldom break; they run with GRASP_TEST_CASES=all.
 LONG = ("-- bake ",)
@@ -121,7 +121,7 @@ def test_command(command, server):
     run = subprocess.run(arguments, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=540)
     said = run.stdout + run.stderr
     if "-max-time" in command:
-        # Such calls end at their deadline only; a shell's exit code is not that of what ran in its background.
+        # Such calls end at their deadline only; a shell's exit code is not that of its background jobs.
         assert "deadline_exceeded" in run.stderr, said
         assert run.returncode == (0 if " &\n" in command else DEADLINE_EXCEEDED), said
     else:

@@ -45,7 +45,7 @@ def bundles():
 
 
 def check(result):
-    """What every page gets."""
+    """Checks the results of every page."""
     assert "failed" not in result, result["failed"]
     found = result["found"]
     assert (found["outcome"], found["joints"]) == ("FOUND", 26)
@@ -63,7 +63,7 @@ def check(result):
 
 
 def check_tracked(answers):
-    """What a page gets that tracks a motion: every frame answered, and the hand keeps to the object."""
+    """Checks a tracked motion: every frame is answered, and the hand keeps to the object."""
     assert [answer["sequence"] for answer in answers] == list(range(1, len(answers) + 1))
     assert answers[0]["status"] == "REPLANNED"
     for before, after in zip(answers, answers[1:]):
@@ -94,7 +94,7 @@ def test_node_tracks_a_motion(in_node):
 
 @pytest.fixture(scope="module")
 def page(bundles):
-    """A server of the page, and the queue of what the page posts."""
+    """A server of the page, and the queue of its posts."""
     results = queue.Queue()
 
     class Handler(http.server.BaseHTTPRequestHandler):

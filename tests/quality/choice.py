@@ -1,4 +1,4 @@
-"""What people notice about how a hand takes an object: from which side, by which dimension, and where along it.
+"""How a hand takes an object, as people see it: from which side, by which dimension, and where along it.
 
 The object's box is the smallest that holds it. A hand approaches halfway between its stretched fingers and its palm's
 normal. Lengths are in metres, angles in degrees.
@@ -26,7 +26,7 @@ CHANCE = 100 * (1 - np.cos(np.radians(ALONG)))
 SMALLEST = 1.2
 # Share of long things that people take end-on: 53 objects, nobody holding. In percent.
 PEOPLE_END_ON = 34
-# Directions from which the hull is tried to stand in a box.
+# Largest number of the hull's faces that are tried as a face of the box.
 DIRECTIONS = 250
 
 
@@ -140,7 +140,7 @@ def end_on(rows, name="approach_to_axis"):
 
 
 def lines(found):
-    """Lines of the table of targets: what is measured, the target, the figure, and whether it is met."""
+    """Lines of the table of targets: measure, target, figure, and whether it is met."""
     rows = [row for row in found if "long" in row]
     result = []
     for held_out, name, wanted in [

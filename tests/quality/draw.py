@@ -10,7 +10,7 @@ import measures
 
 # Pixels along each side, of the picture and of the trials that choose the view.
 SIZE, TRIAL = 400, 100
-# What a pixel can show.
+# The kinds of pixels.
 NOTHING, OBJECT, PALM, IDLE, TOUCHING, CONTACT = range(6)
 COLOURS = np.array([[1, 1, 1], [0.55, 0.6, 0.66], [0.87, 0.72, 0.6], [0.93, 0.81, 0.7], [0.95, 0.66, 0.5], [0.8, 0, 0]])
 # Value of seeing a pixel of each: touching parts matter most, and contacts are mostly hidden.

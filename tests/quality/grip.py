@@ -1,4 +1,4 @@
-"""What a hand does with an object: which parts of it touch, from which side, and how the thumb opposes the fingers.
+"""The features of a grasp: which parts of the hand touch, from which side, and how the thumb opposes the fingers.
 
 Everything comes from the joint poses with radii, the contacts of the reply and the object's surface, in the object's
 frame. Lengths are in metres, angles in degrees. Memberships run from 0 to 1.
@@ -18,7 +18,7 @@ from hand import CHAINS, DIGITS, PALM, PHALANGES, WRIST
 TOUCH, APART, UNSEEN = 0.0005, 0.004, 0.002
 # The palm's flesh gives way more than the capsules show.
 PALM_TOUCH, PALM_APART = 0.002, 0.010
-# Distance between the samples of the surface that stand for it here.
+# Distance between the samples of the surface.
 SPACING = 0.0025
 
 
@@ -128,7 +128,7 @@ def read(mesh, hand, contacts):
                 row = np.flatnonzero((tags == (digit, phalanx)).all(axis=1))[0]
                 phalanges[digit, phalanx] = 1.0
                 sure[digit] = perhaps[digit] = True
-                # What presses says more about the opposition than what merely touches.
+                # Pressing contacts say more about the opposition than mere touches.
                 touched.append((row, contact["position"], 1.0 + 3.0 * np.linalg.norm(contact["force"])))
         if touched:
             rows, spots, weights = (np.array(column) for column in zip(*touched))
@@ -204,7 +204,7 @@ ROUND = np.cos(np.radians(25))
 
 @dataclass
 class Shape:
-    """What is held, with lengths in metres and memberships from 0 to 1."""
+    """The held part, with lengths in metres and memberships from 0 to 1."""
 
     # Along the long direction, and across it: the larger and the smaller side of a slice.
     length: float
@@ -235,7 +235,7 @@ class Shape:
 
 
 def shape_of(mesh, grip, contacts):
-    """The shape of what the hand holds."""
+    """The shape of the held part."""
     points, normals, tree = coarse_samples(mesh)
     spots = grip.places[np.isfinite(grip.places).all(axis=1)]
     if len(spots) == 0:
@@ -249,7 +249,7 @@ def shape_of(mesh, grip, contacts):
     opening = opening_of(grip, contacts)
     shape = Shape(length, width, depth, along, roundness, opening)
     ball, _ = fitted(points[near], normals[near], 10, 16)
-    # A handle on a round body makes the slice oblong, but not what the hand feels.
+    # A handle on a round body makes the slice oblong, but not the part in the hand.
     across = np.linalg.svd(along[None])[2][1:]
     facing = normals[near] @ across.T
     sideways = np.linalg.norm(facing, axis=1) > 0.5
@@ -270,7 +270,7 @@ def patch(points, normals, tree, spot):
     near = np.array(tree.query_ball_point(spot, CURVE_REACH), int)
     if len(near) < 4:
         return tree.query(spot, k=min(8, len(points)))[1]
-    # The far side of a wall is none of the fingers' business.
+    # The far side of a wall is not under the fingers.
     nearest = near[np.argmin(np.linalg.norm(points[near] - spot, axis=1))]
     near = near[normals[near] @ normals[nearest] > 0.3]
     return near[connected(points[near], spot)]
@@ -349,7 +349,7 @@ def bulge(slopes, width):
 
 
 def opening_of(grip, contacts):
-    """Distance between what opposes: the thumb, or else the palm, and the fingers."""
+    """Distance between the opposed sides: the thumb, or else the palm, and the fingers."""
     fingers = grip.middle_of([1, 2, 3, 4])
     thumb = grip.middle_of([0])
     first = thumb if thumb is not None else grip.palm_middle

@@ -248,9 +248,9 @@ SEARCH_SECONDS = 0.5
 ROOM = 0.003
 # The object is off the client's origin, so that confusing the frames shows.
 POSE = {"position": [0.0, 1.2, 0.3], "orientation": [0.0, 0.0, 0.0, 1.0]}
-# Requests for both hands on what is beyond one.
+# Requests for both hands on an object beyond one.
 BOTH_SEARCHES = 10
-# Targets, in percent: of the requests on what one hand can hold, alone and with a giver who leaves room, those answered in
+# Targets, in percent: of the requests on objects for one hand, alone and with a giver who leaves room, those answered in
 # time; and of the requests for both hands, those that are held in simulation.
 ALONE, GIVEN, BOTH = 95, 90, 80
 
@@ -269,7 +269,7 @@ class Thing:
 
 
 def things():
-    """Writes the files of all everyday objects and returns what they say, by name."""
+    """Writes the files of all everyday objects and returns the objects by name."""
     if not PROGRAM.exists():
         raise SystemExit(f"{PROGRAM.relative_to(ROOT)} is missing: cargo build --release --package grasp-everyday")
     subprocess.run([PROGRAM, FOLDER], check=True, capture_output=True, timeout=60)
@@ -416,7 +416,7 @@ def table(rows, known):
 
 
 def by_both_hands(rows, known):
-    """Lines of a Markdown table of what is beyond one hand."""
+    """Lines of a Markdown table of objects beyond one hand."""
     asked = {}
     for row in rows:
         if row.get("both"):

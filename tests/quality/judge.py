@@ -138,7 +138,7 @@ def cases(name, service, options, givers, thing):
         request["seed"] = str(seed)
         request["validity"] = options.validity
         request["strategy"] = options.strategy
-        # Who takes something with both hands is not asked with which one.
+        # Requests for both hands name no handedness.
         if request.get("hands") != "both":
             hand = {**(request.get("receiving_hand") or {}), "handedness": asked_handedness(options)}
             request["receiving_hand"] = {**hand, "rig": options.rig} if options.rig else hand
@@ -181,7 +181,7 @@ def ask(service, request, options, **picture):
 
 
 def everyday_givers(names, things, options):
-    """Givers of the everyday objects by name, from a server of their own: that which is judged must not know them."""
+    """Givers of the everyday objects by name, from a server of their own: the judged server must not know them."""
     chosen = [things[name] for name in names if name in things and not things[name].beyond]
     if not chosen or options.givers == "none":
         return {}

@@ -24,9 +24,9 @@ LEGEND = (
 )
 # Pixels along each side of a view.
 SIZE = 440
-# Distances between the points of a body and of what is small, in metres; a point covers three pixels of 2 to 4 mm.
+# Distances between the points of a body and of small things, in metres; a point covers three pixels of 2 to 4 mm.
 BODY_SPACING, HAND_SPACING = 0.0045, 0.003
-# What a pixel can show.
+# The kinds of pixels.
 NOTHING, OBJECT, GIVER, GIVER_ARM, FITTING, FITTING_ARM, WRONG, WRONG_ARM = range(8)
 BODIES = (GIVER, FITTING, WRONG)
 COLOURS = np.array(

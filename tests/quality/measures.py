@@ -36,7 +36,7 @@ STRONGEST = 27.0
 # A contact's largest torsion over friction times force, in metres: two thirds of the radius, some 6 mm, of a pad's
 # evenly pressed patch under a few newtons. Slip and torsion share the friction (an ellipse).
 TORSION_RADIUS = 0.004
-# Largest swing of what hangs in hooked fingers until it is at rest, in degrees.
+# Largest swing of a load in hooked fingers until it is at rest, in degrees.
 SWING = 32.0
 # Range of the length that epsilon divides torques by, in metres.
 HAND_LENGTHS = (0.02, 0.06)
@@ -160,7 +160,7 @@ def surface_near(mesh, hand, margin=0.03):
 
 
 def at_rest(centre_of_mass, contacts, up):
-    """The centre of mass of what hangs in contacts with forces, after it has swung until it is below the forces.
+    """The centre of mass of a load that hangs in contacts with forces, after it has swung until it is below the forces.
 
     It swings about the middle of the contacts, and by SWING at most.
     """
@@ -178,7 +178,7 @@ def at_rest(centre_of_mass, contacts, up):
 def forces(scene, contacts, up, hangs=False):
     """Whether the forces are inside their cones, and the share of the weight that they leave unbalanced.
 
-    The imbalance combines force, and torque over the object's reach. What hangs is at rest.
+    The imbalance combines force, and torque over the object's reach. A hanging load is at rest.
     """
     weight = scene.mass * GRAVITY
     if not contacts:
@@ -217,7 +217,7 @@ def epsilon(scene, contacts):
 
     Epsilon is the smallest support of the convex hull of all wrenches that a press of one newton can exert; in each
     direction of wrench space the support is that of the best contact. Torques are about the middle of the contacts and
-    divided by half their span, within a hand's lengths: what is far from the hand does not count. The search refines random directions by ever
+    divided by half their span, within a hand's lengths: parts far from the hand do not count. The search refines random directions by ever
     smaller random steps.
     """
     if not contacts:
@@ -357,7 +357,7 @@ def self_clearance(hand):
     """The smallest distance between parts of the hand that are not joined: between digits, and from digits to the palm.
 
     Neighbouring proximal phalanges share the web at the knuckles, so only their outer halves count. Against the palm
-    only what lies beyond the middle joint counts (of the thumb, the last phalanx).
+    only the links beyond the middle joint count (of the thumb, the last phalanx).
     """
     capsules, tags = hand.solids()
     trimmed, _ = hand.solids()
@@ -456,7 +456,7 @@ def judge_both(scene, grasps):
 
 
 def worse(name, values):
-    """The worse of both hands' values of a measure; of texts and of what a reply leaves out, the first there is."""
+    """The worse of both hands' values of a measure; of texts and of values that a reply omits, the first there is."""
     if any(value is None or isinstance(value, str) for value in values):
         return next((value for value in values if value), values[0])
     return min(values) if name in LEAST else max(values)

@@ -1,4 +1,4 @@
-"""Parts of objects that matter to who takes them: handles, sharp edges and points; and what heavy things ask for.
+"""Parts of objects that matter to a receiver: handles, sharp edges and points; and power for heavy things.
 
 Handles are labelled by the groups of the everyday objects' files, or by formulas on positions in the object's frame.
 Sharp features are found in the mesh. Lengths are in metres, angles in degrees.
@@ -77,7 +77,7 @@ BY_FORMULA = {
     "dumbbell": lambda p: (np.hypot(p[:, 1], p[:, 2]) < 0.02) & (np.abs(p[:, 0]) < 0.07),
     "rolling-pin": lambda p: (np.hypot(p[:, 1], p[:, 2]) < 0.02) & (np.abs(p[:, 0]) > 0.13),
 }
-# What a finger needs beside the giver's hand, in metres.
+# Room for a finger beside the giver's hand, in metres.
 FINGER = 0.012
 # A contact this near to a sample of the handle is on it: as far as samples are apart.
 BENEATH = 0.0025
@@ -90,7 +90,7 @@ BLUNT, WEDGE, EDGE_REACH = 0.0015, (5.0, 30.0), 0.005
 TIP_ANGLE, TIP_REACH, TIP_SLACK = 20.0, 0.005, 0.0003
 # A contact this near to a sharp feature is on it; surface this far from it is safe, and so long a safe piece is enough.
 ON_SHARP, SAFE, ENOUGH = 0.002, 0.005, 0.06
-# Digits that hold what is heavy, unless the palm does.
+# Digits that hold heavy things, unless the palm does.
 MANY_DIGITS = 4
 
 

@@ -41,7 +41,7 @@ STRIDE = 5
 PUSH = 10.0
 # The object is lost when it has moved or turned farther than this, in metres and degrees.
 LOST_DISTANCE, LOST_ANGLE = 0.05, 15.0
-# What hangs in hooked fingers may swing: it is lost when the place by which it hangs has moved as far, or it turns over.
+# A load in hooked fingers may swing: it is lost when the place by which it hangs has moved as far, or it turns over.
 LOST_SWING = 60.0
 # Stiffness of the posture's spring at a fingertip in newtons per metre, shared evenly by the three joints: that of
 # pressing index fingers (200 to 800 N/m, Hajian and Howe 1997, from memory). Twice or four times as much hardly changes

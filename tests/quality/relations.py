@@ -118,7 +118,7 @@ def scatter(file, found, acceptable):
 
 
 def types(found):
-    """Markdown table of the grasp types in the replies: how often, and with what confidence."""
+    """Markdown table of the grasp types in the replies: how often, and with which confidence."""
     typed = [row for row in found if "type" in row]
     counts = collections.Counter(row["type"] for row in typed)
     lines = ["| type | grasps | share | mean confidence |", "|---|--:|--:|--:|"]

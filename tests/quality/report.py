@@ -108,7 +108,7 @@ def answered(found, without):
 
 
 def within_reach(rows):
-    """How much of what one hand can take is answered in time; nothing without everyday objects."""
+    """How many requests on objects for one hand are answered in time; nothing without everyday objects."""
     lines = []
     kinds = [("alone", holdouts.ALONE), ("with a giver who leaves room", holdouts.GIVEN)]
     for (kind, least), (asked, in_time) in zip(kinds, holdouts.shares(rows)):
@@ -142,7 +142,7 @@ def held(found):
     if not found:
         return []
     lines = []
-    # A hook bears the weight; nobody asks it to resist a push from below.
+    # A hook bears the weight; it need not resist a push from below.
     closed = [row for row in found if not row.get("hangs")]
     for name, measure, least in [
         ("survives_gravity", "survives gravity in simulation", 95),

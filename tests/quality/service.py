@@ -112,7 +112,7 @@ DIGITS = ["thumb", "index", "middle", "ring", "little"]
 # Links of a digit, from the wrist on; contacts of the palm have none.
 PHALANGES = [None, "first", "second", "third"]
 VECTORS = {"position", "orientation", "up", "client_shoulder", "client_approach", "half_extents"}
-# Where requests have what the judge's have at their top.
+# Messages that hold the judge's top-level keys in requests.
 PLACES = {
     "object": "holdout",
     "client_from_object": "holdout",
@@ -124,7 +124,7 @@ PLACES = {
     "ignore_atlas": "search",
     "budget_seconds": "search",
 }
-# What names of values start with, by the keys of requests that have them.
+# Prefixes of the names of values, by the keys of requests that have them.
 PREFIXES = {
     "handedness": "HANDEDNESS",
     "strategy": "STRATEGY",
@@ -135,7 +135,7 @@ PREFIXES = {
     "excluded_grasp_types": "GRASP_TYPE",
 }
 CHOICES = {"first": "first_valid", "best": "best_within_budget"}
-# What the judge calls the margins of a grasp.
+# The judge's names for the margins of a grasp.
 MARGINS = {
     "CHECK_BALANCE": "residual",
     "CHECK_CLOSURE": "epsilon",
@@ -146,7 +146,7 @@ MARGINS = {
 
 
 def to_message(request):
-    """A request as protobuf's JSON. What is None is left out."""
+    """A request as protobuf's JSON. Values of None are left out."""
     request = {key: value for key, value in request.items() if value is not None}
     parts = {"holdout": {}, "receiver": {}, "requirements": {}, "search": {}}
     for key, part in PLACES.items():
@@ -247,7 +247,7 @@ def answer_of(message):
 
 
 def _grasp(message):
-    """One hand that holds an object. What is absent has a meaning in answers."""
+    """One hand that holds an object. Absent fields have a meaning in answers."""
     hand = message["hand"]
     in_client, in_object = _pose(hand["clientFromWrist"]), _pose(hand["objectFromWrist"])
     turn = Rotation.from_quat(in_client["orientation"]) * Rotation.from_quat(in_object["orientation"]).inv()
@@ -287,7 +287,7 @@ def _grasp(message):
 
 
 def _name(value):
-    """The name of an enumeration's value without what the names of all its values start with."""
+    """The name of an enumeration's value without the prefix that all of them share."""
     return re.sub("^(HANDEDNESS|DIGIT|GRASP_TYPE|OUTCOME)_", "", value).lower()
 
 

@@ -223,7 +223,7 @@ class Mesh:
 
     @functools.cached_property
     def rims(self):
-        """The ends of the edges along which not as many triangles run one way as the other, and how many more."""
+        """The ends of the edges with unequal numbers of triangles in either direction, and the difference."""
         places, merged = np.unique(np.round(self.vertices, 7), axis=0, return_inverse=True)
         corners = merged.ravel()[self.faces]
         edges = np.concatenate([corners[:, [i, (i + 1) % 3]] for i in range(3)])
@@ -239,7 +239,7 @@ class Mesh:
     def is_sheet(self):
         """Whether the surface is open and so flat that it encloses nothing.
 
-        Its area is no more than a fifth above what its rim encloses in a plane (isoperimetric inequality).
+        Its area is no more than a fifth above the plane area that its rim can enclose (isoperimetric inequality).
         """
         rims, excess = self.rims
         length = (np.linalg.norm(rims[:, 1] - rims[:, 0], axis=1) * excess).sum()

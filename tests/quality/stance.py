@@ -136,7 +136,7 @@ def receivers(giver, up, handedness):
 
 
 def elbows(wrist, bodies, up):
-    """The elbows with which people reach a wrist, and the row of each one's owner; none if nobody does.
+    """The elbows with which people reach a wrist, and the row of each one's owner; empty if nobody does.
 
     Elbows hang, so none is higher than its shoulder, and forearms point forward.
     """
@@ -232,7 +232,7 @@ def judge(scene, grasp):
 
 
 def fits(scene, grasp):
-    """Whether a plausible receiver has the hand of a grasp; nobody asks that if nobody holds the object."""
+    """Whether a plausible receiver has the hand of a grasp; true if nobody holds the object."""
     return judge(scene, grasp).get("stance_fits", True)
 
 
@@ -259,7 +259,7 @@ def arm_of_reply(scene, hand, grasp):
 
 
 def lines(found):
-    """Lines of the table of targets: what is measured, the target, the figure, and whether it is met."""
+    """Lines of the table of targets: measure, target, figure, and whether it is met."""
     given = [row for row in found if "stance_fits" in row]
     result = []
     if given:
@@ -297,7 +297,7 @@ def lines(found):
 
 # Time for one holdout and for one request, in seconds.
 SECONDS, REQUEST_SECONDS = 5.0, 1.0
-# Plausible receivers to ask for.
+# Number of plausible receivers to request.
 RECEIVERS = 6
 # Half angles of the cones in radians, by turns. A hand approaches at 45° to its forearm, so a narrower cone would leave
 # out straight wrists.

@@ -54,7 +54,7 @@ NUMBERS = {name: number for number, name in NAMES.items()}
 POWER = {1, 2, 3, 4, 5, 10, 11, 15, 17, 18, 19, 26, 28, 30, 31}
 INTERMEDIATE = {16, 21, 23, 25, 29, 32}
 # Of each class of shape, the types that the taxonomy shows for it. A held "edge" is the wall of a vessel or a sheet, so
-# it takes what a plate takes.
+# it has the types of a plate.
 ON_ANYTHING = {9, 15, 23, 24, 33}
 ON_LONG = {1, 2, 3, 4, 5, 6, 7, 8, 14, 16, 17, 19, 20, 21, 22, 25, 27, 29, 31, 32}
 ON_FLAT = {6, 7, 8, 14, 16, 18, 22, 25, 27, 30, 32}
@@ -116,7 +116,7 @@ def kind_of(name):
 
 
 def judge(scene, grasp):
-    """The measures of a reply's type: whether the judge would say so too, and what the judge says."""
+    """The measures of a reply's type: whether the judge agrees, and the judge's own type."""
     hand, contacts = measures.in_object_frame(scene, grasp)
     reading = classify(scene.mesh, hand, contacts, bool(grasp.get("hangs")))
     reply = measures.reported_type(grasp).get("type", "")
@@ -140,7 +140,7 @@ def classify(mesh, hand, contacts, hangs=False):
 
 
 class Pose:
-    """What the conditions of the types are made of: memberships from 0 to 1, and sizes."""
+    """The terms of the types' conditions: memberships from 0 to 1, and sizes."""
 
     def __init__(self, grip, shape, contacts):
         touching = [digit for digit in range(1, 5) if grip.touch[digit] > 0.5]
@@ -154,7 +154,7 @@ class Pose:
         self.middles = float(np.mean(grip.phalanges[touching, 1])) if touching else 0.0
         # Fingers hardly bent beyond their knuckles.
         self.extended = falls(np.mean(grip.bends[touching, 1]), 40, 75) if touching else 0.0
-        # What the thumb presses against: the radial side of the index finger, not its pad.
+        # The thumb presses against the radial side of the index finger, not its pad.
         self.side = self.on_side(1) * falls(shape.opening, 0.025, 0.045)
         self.middle_side = self.on_side(2)
         self.tips = float(np.mean([rises(grip.sides[digit, 2], 0.45, 0.75) for digit in [0, *touching]]))
@@ -286,7 +286,7 @@ CONFIDENCES = [0.0, 0.5, 0.6, 0.7, 0.8, 1.0]
 AGREED, AGREED_COLD, ON_HANDLE, ON_SHARP, IN_PALM = 85, 75, 80, 2, 90
 # Targets in percent for heavy things with handles: kept against gravity, and in all six pushes.
 KEPT, KEPT_IN_PUSHES = 95, 75
-# Bounds of the classes of mass in kilograms; the first classes of what is heavy, and of what is heavy for a pinch.
+# Bounds of the classes of mass in kilograms; the lower bounds of heavy objects, and of those heavy for a pinch.
 MASSES = [0.0, 0.1, 0.5, 1.0, np.inf]
 HEAVY, WEIGHTY = 1.0, 0.5
 
@@ -333,7 +333,7 @@ def targets(found):
     handled = [row for row in found if row.get("mass_kg", 0.0) > WEIGHTY and "on_handle" in row]
     handled = [row for row in handled if "survives_gravity" in row]
     share("above 0.5 kg with a handle: kept against gravity", handled, lambda row: row["survives_gravity"], KEPT)
-    # Nobody asks a hook to resist a push from below.
+    # A hook need not resist a push from below.
     pushed = [row for row in handled if not row.get("hangs")]
     share("above 0.5 kg with a handle: all six pushes", pushed, lambda row: row["survives_all"], KEPT_IN_PUSHES)
     return lines
@@ -372,7 +372,7 @@ def calibration(rows):
 
 
 def by_type(rows):
-    """Table of the types in the replies: how many are agreed, and what the judge says instead."""
+    """Table of the types in the replies: how many are agreed, and the judge's types instead."""
     lines = ["| type in the reply | answers | agreed | fits the shape | the judge says, where not agreed |"]
     lines.append("|---|--:|--:|--:|---|")
     for name in sorted({row["type"] for row in rows}, key=lambda name: -sum(row["type"] == name for row in rows)):

@@ -366,7 +366,7 @@ class TestFaults:
         for contact in flipped["contacts"]:
             contact["torsion"] *= -1
         assert sorted("balance" in faults(scene, g) for g in (balanced, flipped)) == [False, True]
-        # A torsion beyond what friction can bear.
+        # A torsion beyond the limit of friction.
         for contact in balanced["contacts"]:
             contact["torsion"] = 1.01 * FRICTION * 2 * MASS * measures.GRAVITY / FRICTION * measures.TORSION_RADIUS
         assert "cone" in faults(scene, balanced)

@@ -7,7 +7,7 @@ pub mod recorded;
 
 pub use harness::{StoppingServer, TestServer, wire_pose};
 
-/// The weights of the score against recorded pairs of valid grasps: one that people would plausibly choose, and one that they would not,
+/// The weights of the score against recorded pairs of valid grasps: one plausible, and one not,
 /// for the reason in the table. `tests/results/measured-once.md` says how they were found.
 #[cfg(test)]
 mod pairs {

@@ -79,8 +79,7 @@ struct JointEntry {
     orientation_xyzw: Quat,
 }
 
-/// All poses of a file such as `poses/handy-work_poses.json`. The files have no radii; `radii` provides them, in metres
-/// and
+/// All poses of a file such as `poses/handy-work_poses.json`. The files have no radii; `radii` provides them, in metres and
 /// `OpenXR` order.
 pub fn read_poses(file: &Path, radii: &[f32; JOINT_COUNT]) -> Vec<RecordedPose> {
     let text = std::fs::read_to_string(file).expect("the pose file can be read");

@@ -20,7 +20,7 @@ use table::Line;
 /// Holdouts per object, givers per object, objects and seconds of the studio in a brief run.
 const BRIEF: [u32; 4] = [4, 2, 6, 4];
 
-/// What is measured together.
+/// Measurements that run together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Row {
     /// With complete atlases: the first valid grasp.
@@ -33,7 +33,7 @@ enum Row {
     Everyday,
     /// Time from a frame of a track to its answer, next to an echo.
     Latency,
-    /// What creating a track costs.
+    /// Cost of creating a track.
     Opens,
     /// Many tracks at a time.
     Crowd,
@@ -57,7 +57,7 @@ struct Arguments {
     /// Objects of the studio.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     objects: u32,
-    /// How long to ask for them, in seconds.
+    /// How long to request them, in seconds.
     #[arg(long, default_value_t = 600, value_parser = clap::value_parser!(u32).range(1..))]
     seconds: u32,
     /// Calls for them per second.

@@ -39,7 +39,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Longest wait for all atlases.
 const ATLAS_TIMEOUT: Duration = Duration::from_hours(1);
 
-/// What all measurements share.
+/// Settings and runtimes of all measurements.
 pub(crate) struct Setting {
     /// Whether to only check that everything runs.
     pub(crate) is_brief: bool,
@@ -99,7 +99,7 @@ impl Setting {
         }
     }
 
-    /// Requests for the built-in holdouts, repeated until there are as many as random ones per object.
+    /// Requests for the built-in holdouts, repeated to the number of random ones per object.
     pub(crate) fn built_in_requests(&self) -> Vec<v1::FindGraspRequest> {
         let request = |holdout: &BuiltInHoldout| {
             ClientHoldout::of_built_in(holdout).request(&format!("objects/{}", holdout.object))
@@ -124,7 +124,7 @@ impl Setting {
             .get_or_init(|| objects().iter().map(test_object).collect())
     }
 
-    /// So many givers of an object.
+    /// `count` givers of an object.
     pub(crate) fn placed_givers(&self, object: &GraspObject, count: u64) -> Vec<PlacedGiver> {
         let bar = bar(count as usize, "placing givers");
         let numbers = (0..count).into_par_iter();
@@ -136,7 +136,7 @@ impl Setting {
         placed.collect()
     }
 
-    /// A server with the binary's defaults, but without builders and with objects in memory, except for what `adapt` changes.
+    /// A server with the binary's defaults, but without builders and with objects in memory; `adapt` changes it.
     pub(crate) fn server(&self, adapt: impl FnOnce(&mut grasp_server::Config)) -> TestServer {
         self.serving.block_on(TestServer::start_with(adapt))
     }
@@ -200,7 +200,7 @@ pub(crate) fn forbidden(groups: Vec<String>) -> Vec<v1::Region> {
         .collect()
 }
 
-/// Asks for the built-in objects until their atlases for both hands are in use.
+/// Requests the built-in objects until their atlases for both hands are in use.
 async fn wait_for_atlases(server: &TestServer) {
     let start = Instant::now();
     let mut client = server.grasps().await;

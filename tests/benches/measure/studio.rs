@@ -1,5 +1,5 @@
 //! A studio with hundreds of objects: how long until most calls are answered from atlases, how much memory that takes, and how
-//! quick answers are meanwhile. The server has its defaults and saves what it holds in a folder.
+//! quick answers are meanwhile. The server has its defaults and saves objects in a folder.
 //!
 //! The objects are the built-in ones, each stretched by factors of its own; they are requested by a Zipf law, at a steady pace.
 
@@ -55,7 +55,7 @@ struct Studio<'a> {
     cumulative: Vec<f64>,
 }
 
-/// What was measured in a span of time: its start, the calls, how many were refused, and resident memory at its end.
+/// Measurements of a span of time: its start, the calls, how many were refused, and resident memory at its end.
 struct Interval {
     from: Duration,
     answers: Vec<Answer>,
@@ -63,7 +63,7 @@ struct Interval {
     megabytes: f64,
 }
 
-/// Creates objects and asks for them for some seconds, so many times per second.
+/// Creates objects and requests them for some seconds, `rate` times per second.
 pub(crate) fn measure(setting: &Setting, count: u32, seconds: u32, rate: u32) -> Vec<Line> {
     let studio = Studio::new(setting, count as usize);
     let folder = Folder(std::env::temp_dir().join(format!("grasp-studio-{}", std::process::id())));
@@ -156,7 +156,7 @@ impl<'a> Studio<'a> {
         took
     }
 
-    /// Asks for the objects, whoever is late.
+    /// Requests the objects at a steady pace, even if answers are late.
     async fn ask(&self, server: &TestServer, pace: Duration, length: Duration) -> Vec<Interval> {
         let client = server.grasps().await;
         let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);

@@ -1,4 +1,4 @@
-//! Tracks of moving givers: how soon frames are answered, what opening one costs, and how many a server holds.
+//! Tracks of moving givers: latency of frames, cost of opening, and how many a server holds.
 
 use std::time::{Duration, Instant};
 
@@ -40,8 +40,8 @@ pub(crate) fn measure_latency(setting: &Setting) -> Vec<Line> {
     [false, true].map(measure).concat()
 }
 
-/// Tracks a built-in holdout whose giver walks. Frames and echoes each begin after the same pause: what follows other work at once
-/// finds threads awake and caches warm.
+/// Tracks a built-in holdout whose giver walks. Frames and echoes each begin after the same pause: straight after other work,
+/// threads are awake and caches warm.
 async fn frames(setting: &Setting, changes_only: bool) -> Vec<Line> {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let built_in = holdouts().iter().find(|holdout| holdout.object == "remote");
@@ -143,7 +143,7 @@ pub(crate) fn measure_crowds(setting: &Setting) -> Vec<Line> {
     crowds.iter().map(of).collect()
 }
 
-/// Runs so many tracks for some seconds.
+/// Runs a number of tracks for some seconds.
 async fn crowd(tracks: usize, seconds: u64) -> Line {
     let server = TestServer::start_with(|config| {
         config.builder_threads = 1;
@@ -179,8 +179,8 @@ async fn crowd(tracks: usize, seconds: u64) -> Line {
     Line::of_times(format!("{tracks} tracks at 90 Hz"), times).remark(remark)
 }
 
-/// Asks for every built-in holdout until the server has read its atlases and prepared its objects, as a server has that has run for
-/// some seconds.
+/// Requests every built-in holdout until the server has read its atlases and prepared its objects, as after some seconds of
+/// service.
 async fn warm_up(client: &mut GraspServiceClient<Channel>) {
     for built_in in holdouts() {
         let object = format!("objects/{}", built_in.object);

@@ -1,4 +1,4 @@
-//! Runs searches and single attempts, and examines how attempts end, how long their steps take, and what else the figures show.
+//! Runs searches and single attempts, and examines how attempts end, how long their steps take, and the other data of the figures.
 
 use std::time::{Duration, Instant};
 

@@ -91,7 +91,7 @@ pub struct Settings {
     pub sets: Vec<Set>,
     /// The holdouts, as indices among the built-in ones.
     pub holdouts: Vec<usize>,
-    /// Searches are timed on one thread, and again on so many; everything but times is taken from one thread.
+    /// Searches are timed on one thread, and again on this many; all other columns are from one thread.
     pub threads: usize,
 }
 

@@ -17,7 +17,7 @@ use crate::{
     plan::{Cell, Settings},
 };
 
-/// Why a run ended early. Its folder has what was made before.
+/// Why a run ended early. Its folder keeps the rows written before.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// A file cannot be written.
@@ -130,7 +130,7 @@ fn failed_attempts(maker: &Maker, settings: &Settings, cell: &Cell) -> Vec<Row> 
         .collect()
 }
 
-/// A row that begins with what reproduces an attempt.
+/// A row that begins with the columns that reproduce an attempt.
 fn origin(cell: &Cell, number: u64, seed: u64, attempt: u64) -> Row {
     let mut row = Row::default();
     row.add("set", cell.set.name);

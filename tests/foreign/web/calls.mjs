@@ -1,4 +1,4 @@
-// Calls of a page, made by the bundles for Node and for browsers alike. What they return is plain data for the test.
+// Calls of a page, made by the bundles for Node and for browsers alike. They return plain data for the test.
 
 import { Code, ConnectError, createClient } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
@@ -25,7 +25,7 @@ async function findGrasp(client) {
   };
 }
 
-// What is wrong with a request.
+// The fault of a request.
 async function rejection(client) {
   try {
     await client.findGrasp({ ...REMOTE, requirements: { friction: -1 } });
@@ -59,7 +59,7 @@ async function streamGrasps(client) {
   return { scores, outcome: Outcome[end] };
 }
 
-// A stream that the page leaves: how its calls ends.
+// A stream that the page leaves: how its call ends.
 async function leave(client) {
   const leaving = new AbortController();
   try {

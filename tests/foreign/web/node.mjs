@@ -1,4 +1,4 @@
-// Makes all calls from Node and prints what came of them.
+// Makes all calls from Node and prints the results.
 
 import { allCalls } from "./calls.mjs";
 

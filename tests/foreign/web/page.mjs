@@ -1,4 +1,4 @@
-// Makes all calls from a page, and posts what came of them to the page's own server.
+// Makes all calls from a page, and posts the results to the page's own server.
 
 import { allCalls } from "./calls.mjs";
 

@@ -77,7 +77,7 @@ fn used(answer: &v1::FindGraspResponse) -> &[v1::Atlas] {
         .atlases
 }
 
-/// The only one.
+/// The only atlas that an answer's search used.
 fn only_used(answer: &v1::FindGraspResponse) -> &v1::Atlas {
     let [atlas] = used(answer) else {
         panic!("{answer:?}");
@@ -130,7 +130,7 @@ async fn an_atlas_grows_answers_requests_and_survives_a_restart() {
     assert!(damaged.iter().any(is_replaced));
 }
 
-/// What a server answers to requests for the right and left hand of a rig that has no atlas yet, each asked twice.
+/// Requests for both hands of a rig that has no atlas yet, each with the answers to two calls.
 async fn asked_twice(server: &TestServer) -> Vec<(v1::FindGraspRequest, [v1::FindGraspResponse; 2])> {
     let mut asked = Vec::new();
     for handedness in [v1::Handedness::Left, v1::Handedness::Right] {
@@ -151,7 +151,7 @@ fn learned_stamps(answer: &v1::FindGraspResponse) -> Vec<&str> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_a_search_found_answers_the_next_request() {
+async fn a_grasp_found_answers_the_next_request() {
     let folder = Folder::absent("learned");
     let server = start(&folder).await;
     create_box(&server).await;
@@ -159,7 +159,7 @@ async fn what_a_search_found_answers_the_next_request() {
     for (request, [first, again]) in asked_twice(&server).await {
         assert_eq!(first.source(), v1::GraspSource::Search);
         assert_eq!(learned_stamps(&first), [""; 0]);
-        // Unless the atlas was faster.
+        // The atlas may have been faster.
         if again.source() == v1::GraspSource::Learned {
             learned += 1;
             assert!(again.grasp().is_some());

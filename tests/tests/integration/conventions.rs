@@ -13,7 +13,7 @@ use crate::fixtures::{find, hand as hand_of, held_remote, reproducible, vec3, wi
 struct Engine {
     convention: v1::Convention,
     axes: Mat3,
-    /// The same for meshes and frames of objects.
+    /// Axes of meshes and of objects' frames.
     object_axes: Mat3,
     units_per_metre: f32,
     joint_turn: Quat,
@@ -271,7 +271,7 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
         assert!((expected.wrist_deviation - actual.wrist_deviation).abs() < 1e-2);
         engine.assert_same_contacts(openxr, grasp);
         engine.assert_same_margins(openxr, grasp);
-        // It is valid as it is and by its place in the client's frame.
+        // The hand is valid both as answered and given by its place in the client's frame.
         let by_client = v1::HandPose {
             object_from_wrist: None,
             ..engines_hand.clone()

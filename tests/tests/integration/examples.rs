@@ -19,10 +19,10 @@ use tonic::{
 
 use crate::fixtures::bounded;
 
-/// Ends strings that stand for all that begin like them.
+/// Ends strings that match every string with the same beginning.
 const ANY: char = '…';
 
-/// Ends strings that stand for the content of a file.
+/// Ends strings that are replaced by the content of a file.
 const OF_FILE: &str = ", in base64";
 
 /// A call with its messages.
@@ -100,10 +100,10 @@ impl Decoder for BytesCodec {
     }
 }
 
-/// Strings of answers by what stands for them.
+/// Strings of answers by their placeholders.
 type Names = BTreeMap<String, String>;
 
-/// A request's JSON with the strings that are meant.
+/// A request's JSON with its placeholders filled in.
 fn filled(value: Value, names: &Names) -> Value {
     match value {
         Value::String(text) => Value::String(match text.strip_suffix(OF_FILE) {

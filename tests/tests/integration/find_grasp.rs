@@ -79,7 +79,7 @@ async fn the_deadline_less_the_reserve_bounds_the_budget() {
     let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
     let answer = answer.expect("the answer comes before the deadline").into_inner();
     assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
-    // A quarter of the deadline, as the reserve would take more.
+    // The reserve would take more, but the budget keeps a quarter of the deadline.
     assert_eq!(budget_of(&answer), Duration::from_millis(500));
 }
 
@@ -193,7 +193,7 @@ async fn the_arm_of_a_given_shoulder_reaches_the_wrist_and_a_receiver_anywhere_h
 /// Edges of the box, in metres: those of [`BOX_OBJ`] in decimetres.
 const LARGE_BOX: Vec3 = Vec3::new(0.4, 0.3, 0.2);
 
-/// In newtons.
+/// Weight of the box in newtons.
 const WEIGHT: f32 = 2.0 * 9.80665;
 
 #[tokio::test(flavor = "multi_thread")]

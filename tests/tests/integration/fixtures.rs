@@ -238,7 +238,7 @@ pub(crate) fn with_object(
     with(request, |request| change(request.object_mut()))
 }
 
-/// A change of the object of this name to what `change` sets.
+/// A change of the object of this name by `change`.
 pub(crate) fn update_of(name: &str, change: impl FnOnce(&mut v1::GraspObject)) -> v1::UpdateObjectRequest {
     let object = v1::GraspObject {
         name: name.to_owned(),

@@ -12,7 +12,7 @@ use crate::fixtures::{
     box_request, find, hand as hand_of, masked, reproducible, update_of, with, with_object,
 };
 
-/// What is near a forbidden grip unless it says otherwise, in metres and radians.
+/// Default neighbourhood of a forbidden grip, in metres and radians.
 const NEAR: (f32, f32) = (0.03, 0.5);
 
 /// A request to create the box with these grips.
@@ -67,7 +67,7 @@ async fn found(seed: u64) -> v1::HandPose {
     hand
 }
 
-/// What an object keeps of a hand that was answered.
+/// The fields of an answered hand that an object keeps.
 fn kept(hand: &v1::HandPose) -> v1::HandPose {
     v1::HandPose {
         client_from_wrist: None,
@@ -116,10 +116,10 @@ async fn a_valid_preferred_grip_is_answered_whatever_else_there_is() {
             }
         }
     }
-    // It is of the right hand only.
+    // The grip is of the right hand only.
     let left = request(0).receiving(Handedness::Left);
     assert_ne!(find(&server, left).await.source(), GraspSource::KnownGrip);
-    // Of either hand, it precedes others.
+    // It also comes first in requests for either hand.
     let either = request(0).receiving(Handedness::Unspecified);
     assert_eq!(find(&server, either).await.source(), GraspSource::KnownGrip);
 }

@@ -94,7 +94,7 @@ fn validation(holdout: v1::FindGraspRequest) -> v1::ValidateGraspRequest {
     }
 }
 
-/// A holdout for which there is much time and no grasp.
+/// A request with a long budget for a holdout without a grasp.
 async fn long(server: &TestServer) -> v1::FindGraspRequest {
     impossible(server).await.with_budget(Duration::from_secs(10))
 }
@@ -129,7 +129,7 @@ async fn the_answer_comes_before_the_deadline() {
         let call = Box::pin(method.call(server.grasps().await, holdout.clone(), timeout));
         let answer = bounded("the answer", call).await;
         if let Err(status) = answer {
-            // On a machine that is too busy to end the work in time; a client that had given up would say that it cancelled.
+            // On a machine too busy to end the work in time; a client that gave up would report `Cancelled`.
             assert_status(&status, Code::DeadlineExceeded, "DEADLINE_EXCEEDED");
         }
         until("the end of the work", || server.gauges().searches() == 0).await;
@@ -273,7 +273,7 @@ async fn clients_that_do_not_read_are_bounded_in_all_and_closed() {
         );
         others.push(bounded("a connection", Unreading::start(&server)).await);
         let unread = server.gauges().unread_bytes();
-        // What waits on connections that are being closed is freed a moment later.
+        // Bytes that wait on closing connections are freed a moment later.
         assert!(unread <= 2 * LEAST, "{unread} bytes wait");
     }
     until("what was beyond the bound to be freed", || {
@@ -297,7 +297,7 @@ async fn clients_that_do_not_read_are_bounded_in_all_and_closed() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn requests_that_clients_do_not_end_are_bounded_in_all_and_closed() {
-    /// Bytes of each request, of a message that would have some more.
+    /// Bytes sent of each request, which is larger.
     const SENT: usize = 150 << 10;
     let server =
         TestServer::start_with(|config| config.maximum_unread_bytes = LEAST.try_into().unwrap()).await;
@@ -317,7 +317,7 @@ async fn requests_that_clients_do_not_end_are_bounded_in_all_and_closed() {
             begun.push((answer, body));
         }
         connections.push(connection);
-        // What is sent arrives meanwhile.
+        // The bytes sent arrive meanwhile.
         tokio::time::sleep(Duration::from_millis(50)).await;
         let bytes = server.gauges().unread_bytes();
         assert!(bytes <= 2 * LEAST, "{bytes} bytes have arrived");
@@ -341,7 +341,7 @@ async fn pages_that_do_not_read_are_closed() {
         body.len()
     );
     let call = [request.as_bytes(), &body].concat();
-    // It asks until the sockets between it and the server are full in both directions, takes nothing, and is closed for that.
+    // The page sends calls and reads nothing until the sockets are full in both directions, and is closed for that.
     let asking = tokio::spawn(async move {
         let mut calls = 0;
         while page.write_all(&call).await.is_ok() {

@@ -1,4 +1,4 @@
-//! The order of modules: a module imports only what the layers before its own declare.
+//! The order of modules: a module imports only from the layers before its own.
 //!
 //! [`violations`] reads every path of the sources, also those in expressions, types and macros, not only `use` lines. Code under
 //! `#[cfg(test)]` is left out. It relies on the sources' format, which `cargo fmt --check` guarantees: items end on a line of their
@@ -65,7 +65,7 @@ fn assert_layered(src: &str, layers: &[&[&str]]) {
     );
 }
 
-/// Every import against the order, as `file:line: what is wrong`. A module may import modules of the rows before its
+/// Every import against the order, as `file:line: fault`. A module may import modules of the rows before its
 /// own; since modules of one row may not import each other, an order without violations has no circle.
 ///
 /// Modules that the order does not list, listed modules that do not exist, and imports through the crate root are
@@ -107,7 +107,7 @@ struct Import {
     to: String,
 }
 
-/// What was found in the files read so far.
+/// The modules and imports of the files read so far.
 #[derive(Default)]
 struct Scan {
     top_level: Vec<String>,
@@ -207,7 +207,7 @@ fn first_names(path: &str) -> Vec<&str> {
     names
 }
 
-/// The code with as many lines, without comments and without what is compiled for tests only.
+/// The code without comments and tests, with the same number of lines.
 fn without_tests(text: &str) -> String {
     let mut lines = text.lines();
     let mut code = String::new();

@@ -179,7 +179,7 @@ async fn equal_requests_at_the_same_time_create_one_object() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_update_changes_what_it_names() {
+async fn an_update_changes_the_fields_it_names() {
     let server = TestServer::start().await;
     let before = create(&server, box_request("crate")).await.unwrap();
     let change = |object: &mut v1::GraspObject| {
@@ -211,7 +211,7 @@ async fn an_update_changes_what_it_names() {
     let twin = create(&server, twin).await.unwrap();
     assert_eq!(twin.content_hash, after.content_hash);
 
-    // The mask selects; what it lists and the request omits returns to the default.
+    // The mask selects; listed fields that the request omits return to the default.
     let mask = ["friction", "center_of_mass", "regions", "labels"];
     let request = masked(&mask, heavier(&before.name, 9.0));
     let reset = update(&server, request).await.unwrap();
@@ -222,7 +222,7 @@ async fn an_update_changes_what_it_names() {
         ..before.clone()
     };
     assert_eq!(reset, expected);
-    // Nothing is different: the state stays.
+    // An update without a difference keeps the state.
     let same = heavier(&before.name, 0.4);
     assert_eq!(update(&server, same).await.unwrap(), reset);
 }

@@ -146,9 +146,9 @@ const VRM: Style = Style {
 
 /// A skin in the client's frame.
 struct DrawnSkin {
-    /// Not finite where the skin follows other nodes than the hand's.
+    /// Vertices; not finite where the skin follows nodes outside the hand.
     positions: Vec<Vec3>,
-    /// Those of the hand.
+    /// Triangles of the hand.
     triangles: Vec<[usize; 3]>,
 }
 
@@ -285,7 +285,7 @@ async fn the_drawn_skin_touches_where_the_answer_says() {
         let (mut contacts, mut deepest): (Vec<f32>, Vec<f32>) = (Vec::new(), Vec::new());
         let seeded = (1..=3).flat_map(|seed| holdouts().iter().map(move |holdout| (seed, holdout)));
         for (seed, holdout) in seeded {
-            // Each time the same grasps.
+            // Reproducible, so that each run measures the same grasps.
             let request = v1::FindGraspRequest {
                 receiver: Some(right_hand_of(&format!("rigs/{id}"), scale)),
                 ..unaided(reproducible(request_for(holdout)))

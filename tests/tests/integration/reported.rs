@@ -166,7 +166,7 @@ async fn utf16_is_read_and_other_formats_are_named() {
         assert_eq!(object.triangle_count, 12, "{name}");
         assert_eq!(edges(&object), [30, 60, 120], "{name}");
     }
-    // One triangle of text STL, which is read by now.
+    // One triangle of text STL.
     let read = create(&server, &folder.join("create-stl.json")).await.unwrap();
     assert_eq!(read.triangle_count, 1);
     for (name, format) in [("gltf", "glTF"), ("html", "HTML"), ("lfs", "Git LFS")] {
@@ -262,9 +262,9 @@ async fn found(server: &TestServer, request: v1::FindGraspRequest) -> v1::Grasp 
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_far_from_the_hand_does_not_keep_it_from_holding() {
+async fn parts_far_from_the_hand_do_not_keep_it_from_holding() {
     let Some((server, folder)) = report(
-        "what_is_far_from_the_hand_does_not_keep_it_from_holding",
+        "parts_far_from_the_hand_do_not_keep_it_from_holding",
         "long-and-wide",
     )
     .await

@@ -15,7 +15,7 @@ use crate::{
     own_hands::{new_rig, right_hand_of},
 };
 
-/// A server that saves in a folder, and keeps so many objects in memory.
+/// A server that saves in a folder, and keeps `in_memory` objects in memory.
 async fn start(folder: &Folder, in_memory: usize) -> TestServer {
     TestServer::start_with(|config| {
         config.place = StorePlace::Folder(folder.path().to_owned());
@@ -108,7 +108,7 @@ async fn a_restart_keeps_objects_labels_etags_and_request_ids() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_object_out_of_memory_is_found_again_by_its_name() {
     let folder = Folder::absent("saved-rest");
-    // Two in memory, because the call before may not have ended everywhere when its answer is here.
+    // Two in memory, because a call may still run when its answer has arrived.
     let server = start(&folder, 2).await;
     let names = ["a", "b", "c", "d"].map(|id| format!("objects/{id}"));
     let mut created = Vec::new();
@@ -141,7 +141,7 @@ async fn an_object_out_of_memory_is_found_again_by_its_name() {
     let heavier = update_of(&names[2], |object| object.mass_kg = 0.4);
     update(&server, heavier).await.unwrap();
     assert_eq!(get(&server, &names[2]).await.unwrap().mass_kg, 0.4);
-    // Of all this, watchers hear of the changes only.
+    // Watchers are told only of the changes.
     for expected in [&names[1], &names[2]] {
         let report = bounded("a report", changes.message()).await.unwrap().unwrap();
         assert_eq!(report.changes, [i32::from(v1::ObjectChange::Updated)]);

@@ -1,4 +1,4 @@
-//! What version 0.1 saved is there, as it was.
+//! Objects and rigs saved by version 0.1 are read unchanged.
 //!
 //! The folder beside this file is one that a server of that version wrote: `objects/bottle` in a file in millimetres whose z points
 //! up, with everything that a client can give an object, `objects/plain` with nothing of it, and `rigs/ada` from the joints of
@@ -114,7 +114,7 @@ async fn objects_are_as_they_were() {
     let status = create(&server, reused).await.unwrap_err();
     assert_status(&status, Code::FailedPrecondition, "REQUEST_ID_REUSED");
 
-    // What was preferred is preferred.
+    // The preferred grip is still preferred.
     let request = reproducible(v1::FindGraspRequest::new("objects/bottle").with_seed(1))
         .with_budget(Duration::from_secs(10));
     let request = v1::FindGraspRequest {
@@ -128,7 +128,7 @@ async fn objects_are_as_they_were() {
     let answer = find(&server, request).await;
     assert_eq!(answer.source(), v1::GraspSource::KnownGrip);
 
-    // A change writes what it does not change as it was.
+    // A change leaves the other fields as they were.
     let heavier = update_of("objects/bottle", |object| object.mass_kg = 0.4);
     let changed = update(&server, heavier).await.unwrap();
     server.stop().await;
@@ -142,7 +142,7 @@ async fn objects_are_as_they_were() {
     };
     let expected = [expected, plain];
     assert_same(&objects(&server).await, &expected);
-    // Of the file that is still there, too.
+    // The same after its mesh is read from the file.
     mesh(&server, "objects/bottle").await.unwrap();
     assert_same(&objects(&server).await, &expected);
     let status = create(&server, box_request("plain")).await.unwrap_err();

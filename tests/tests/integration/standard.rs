@@ -1,4 +1,4 @@
-//! What every gRPC server has: health, reflection, a start when it is ready, and a shutdown.
+//! Standard services and life cycle: health, reflection, a start when it is ready, and a shutdown.
 
 use std::{env, process::Command, time::Duration};
 

@@ -193,7 +193,7 @@ async fn meddle(server: &TestServer, mut seed: u64) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_a_watcher_is_told_adds_up_to_the_list_however_clients_interleave() {
+async fn messages_to_a_watcher_add_up_to_the_list_however_clients_interleave() {
     let server = TestServer::start_with(|config| config.maximum_uploads = 16.try_into().unwrap()).await;
     let mut stream = watch(&server, "", true).await.unwrap();
     tokio::join!(
@@ -219,7 +219,7 @@ async fn what_a_watcher_is_told_adds_up_to_the_list_however_clients_interleave()
     }
 }
 
-/// What a stream consists of.
+/// The messages of a stream.
 #[derive(Debug)]
 struct Streamed {
     /// Every message but the last, with a grasp each.
@@ -268,7 +268,7 @@ async fn stream(server: &TestServer, request: v1::StreamGraspsRequest) -> Result
     })
 }
 
-/// As many attempts as need no end by the clock, so that the search is the same each time.
+/// A search bounded by attempts and not by the clock, so that it is the same each time.
 fn attempts(number: u64, request: v1::FindGraspRequest) -> v1::FindGraspRequest {
     with(request.with_budget(Duration::from_secs(10)), |request| {
         request.search_mut().max_attempts = Some(number);

@@ -213,8 +213,8 @@ fn overtaken(sequence: u64) -> v1::TrackAnswer {
     }
 }
 
-// Random messages in random order: whatever comes, a track answers wrong frames by name and goes on, or ends with a status that names
-// a message that is none; its answers are in order, and nothing queues.
+// Random messages in random order: a track names the fault of each wrong frame and goes on, or ends with a status that names an
+// invalid message; its answers are in order, and nothing queues.
 
 /// Tracks of random messages.
 const TRACKS: u64 = 40;
@@ -222,7 +222,7 @@ const TRACKS: u64 = 40;
 /// A way to make a right frame wrong with a wrong number, and the field that is to blame.
 type Fault = (&'static str, fn(&mut v1::TrackFrame, f32));
 
-/// All of them.
+/// All faults.
 const FAULTS: [Fault; 15] = [
     ("holdout.client_from_object.position", |frame, wrong| {
         pose(frame).position = Some(Vec3::new(wrong, 0.0, 0.0).into());
@@ -294,7 +294,7 @@ fn giver(frame: &mut v1::TrackFrame) -> &mut v1::HandPose {
     }
 }
 
-/// A frame that is wrong in one to three ways, and what is to blame.
+/// A frame that is wrong in one to three ways, and the field to blame.
 fn wrong_frame(sequence: u64, random: &mut impl Rng) -> (v1::TrackFrame, &'static str) {
     let mut wrong = frame(sequence, swaying(sequence));
     let &value = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e30]
@@ -379,7 +379,7 @@ async fn random_track(server: &TestServer, seed: u64) {
                 tokio::time::sleep(Duration::from_millis(random.random_range(0..20))).await;
             }
         }
-        // A track with a message that is none must end though its client goes on.
+        // An invalid message must end the track although its client goes on.
         let open = blamed.is_some().then_some(sender);
         (sent_frames, blamed, open)
     };
@@ -431,7 +431,7 @@ fn fits(answer: &v1::TrackAnswer, field: Option<&str>) -> bool {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn whatever_comes_a_track_answers_it_or_ends_with_what_was_wrong() {
+async fn a_track_answers_every_message_or_ends_with_the_fault() {
     let server = TestServer::start().await;
     for seed in (0..TRACKS).step_by(4) {
         let track = |beside| random_track(&server, seed + beside);

@@ -1,4 +1,4 @@
-//! Objects that are uploaded in pieces, and registrations that nobody waits for any more.
+//! Objects that are uploaded in pieces, and abandoned registrations.
 
 use std::{
     f64::consts::TAU,
@@ -164,7 +164,7 @@ async fn unfinished(
 ) {
     let (sender, receiver) = tokio::sync::mpsc::channel(4);
     sender.send(begin(box_request(id), bytes)).await.unwrap();
-    // Enough to need a place, if there is as much.
+    // Enough bytes to need a place, if the upload has them.
     let sent = "v 0 0 0\n".repeat(10_000);
     sender
         .send(piece(&sent.as_bytes()[..sent.len().min(bytes / 8 * 8)]))
@@ -212,7 +212,7 @@ async fn uploads_share_permits_and_bytes_until_they_end() {
     until("both uploads", || server.gauges().calls() == 2).await;
     let status = bounded("a refusal", refusal(parts("third", b"v", 1))).await;
     assert_status(&status, Code::ResourceExhausted, "TOO_MANY_UPLOADS");
-    // What drips takes no place.
+    // Slow uploads take no place.
     let mut dripping = Vec::new();
     for number in 0..4 {
         dripping.push(unfinished(&server, &format!("slow-{number}"), 8).await);

@@ -101,7 +101,7 @@ async fn every_check_is_made_although_others_fail() {
     assert!(obstacle.value.unwrap() < -0.3);
     let giver = verdict(&answer, v1::Check::GiverClearance);
     assert_eq!(giver.subject, "holdout.presenting_hand");
-    // From the shoulder to the wrist, less both bones.
+    // Distance from the shoulder to the wrist, less both bones.
     let wrist = answer.grasp.as_ref().unwrap().client_from_wrist().unwrap();
     let away = wrist.position().distance(shoulder);
     let reach = verdict(&answer, v1::Check::Reach).value.unwrap();
@@ -197,7 +197,7 @@ async fn recorded_hands_are_posed_with_the_rig() {
             assert!(farthest < 0.04, "{}: {farthest} m", pose.name);
             assert!(verdict(&answer, v1::Check::JointLimits).passed, "{}", pose.name);
             assert_eq!(hand(&answer.grasp.unwrap()).handedness(), side);
-            // As WebXR sends them, without the palm, they give.
+            // The same hand can be a giver, also as WebXR sends it, without the palm.
             let elsewhere = Pose::new(Vec3::new(-0.2, 1.3, 0.5), Quat::from_rotation_z(2.0));
             let mut giver = sent(&pose.joints.transformed(elsewhere), side);
             giver.joints.remove(0);
@@ -305,7 +305,7 @@ async fn givers_and_obstacles_take_grips_away() {
         "{:?}",
         answer.ratings
     );
-    // Both hands together know more grips than one.
+    // Both hands together have more known grips than one.
     let both = evaluated(&mut client, built_in_request(remotes[0]).into()).await;
     assert!(counts(&both.ratings[0]).0 > free_known);
     let handedness: Vec<_> = both.atlases.iter().map(v1::Atlas::handedness).collect();

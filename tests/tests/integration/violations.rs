@@ -1,5 +1,5 @@
-//! Each method refuses what breaks the contract, in one form, and messages that are none; messages may be packed with gzip. The server's
-//! own tests have the tables of violations.
+//! Each method refuses requests that break the contract, in one form, and malformed messages; messages may be packed with gzip.
+//! The server's own tests have the tables of violations.
 
 use std::time::Duration;
 
@@ -33,7 +33,7 @@ fn assert_refused<T: std::fmt::Debug>(answer: Result<Response<T>, Status>, field
 async fn searches_and_tracks_name_what_is_wrong() {
     let server = TestServer::start().await;
     let mut grasps = server.grasps().await;
-    // An unknown object among other violations is one of them.
+    // An unknown object is reported among the other violations.
     let wrong = with(v1::FindGraspRequest::new("objects/nothing"), |request| {
         request.requirements_mut().friction = Some(-1.0);
         request.search_mut().budget = Some(seconds(-1));
@@ -400,7 +400,7 @@ async fn streams_of_small_messages_are_not_packed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_large_only_when_unpacked_is_refused() {
+async fn messages_that_are_too_large_once_unpacked_are_refused() {
     let server =
         TestServer::start_with(|config| config.maximum_object_bytes = (1 << 20).try_into().unwrap()).await;
     let mut objects = server.objects().await.send_compressed(Gzip);
@@ -423,7 +423,7 @@ async fn what_is_large_only_when_unpacked_is_refused() {
     ] {
         assert_status(&status, Code::OutOfRange, "MESSAGE_TOO_LARGE");
     }
-    // What is not packed as it says is the client's fault.
+    // A message that is not packed as declared is the client's fault.
     let mut body = framed_bytes(b"no gzip");
     body[0] = 1;
     let headers = [("grpc-encoding", "gzip")];

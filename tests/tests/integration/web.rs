@@ -1,5 +1,5 @@
-//! Pages in browsers: gRPC-Web over HTTP/1.1 and HTTP/2, the origins of pages, and what bounds their connections. Of limits that other
-//! clients learn from the transport, pages read a status only in gRPC-Web's framing, and if the headers say that they may.
+//! Pages in browsers: gRPC-Web over HTTP/1.1 and HTTP/2, origins of pages, and limits of connections. Of limits that other
+//! clients learn from the transport, pages read a status only in gRPC-Web's framing, and if the headers allow it.
 
 use std::{net::SocketAddr, time::Duration};
 
@@ -74,7 +74,7 @@ async fn base64_is_understood_and_answered() {
     let (messages, status) = answer.messages::<v1::FindGraspResponse>();
     assert_eq!((messages.len(), status.code()), (1, Code::Ok));
     assert!(messages[0].grasp().is_some());
-    // What is no base64 is the page's fault.
+    // Invalid base64 is the page's fault.
     let answer = call(server.address(), FIND, &headers, b"????".to_vec()).await;
     let (_, status) = answer.messages::<v1::FindGraspResponse>();
     assert_status(&status, Code::InvalidArgument, "MALFORMED_MESSAGE");
@@ -100,7 +100,7 @@ async fn only_pages_of_the_own_machine_may_call_by_default() {
         (refused.status, refused.header("access-control-allow-origin")),
         (403, None)
     );
-    // Nor does a call do anything, whatever the browser makes of the preflight request.
+    // A call has no effect either, even if the browser ignores the refused preflight request.
     let create = framed(&box_request("planted"));
     let method = "ObjectService/CreateObject";
     let refused = call(server.address(), method, &[("origin", foreign)], create).await;
@@ -116,7 +116,7 @@ fn text(answer: &Answer) -> &str {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_no_grpc_web_is_refused_over_http_1_with_the_cause() {
+async fn requests_other_than_grpc_web_are_refused_over_http_1_with_the_cause() {
     let server = TestServer::start().await;
     for (content_type, status, cause) in [
         ("application/json", 415, "Connect"),
@@ -140,7 +140,7 @@ async fn what_is_no_grpc_web_is_refused_over_http_1_with_the_cause() {
     }
 }
 
-/// Headers of so many bytes.
+/// Sends headers of `bytes` bytes.
 async fn send_headers(address: SocketAddr, bytes: usize) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.unwrap();
     let start = format!("POST /grasp.v1.{FIND} HTTP/1.1\r\nhost: x\r\nx: ");

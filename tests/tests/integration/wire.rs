@@ -193,7 +193,7 @@ pub(crate) async fn preflight(address: SocketAddr, origin: &str) -> Answer {
     without_body(address, "OPTIONS", "/grasp.v1.GraspService/FindGrasp", &headers).await
 }
 
-/// Asks for a page as a browser's address bar does.
+/// Requests a page as a browser's address bar does.
 pub(crate) async fn get(address: SocketAddr, path: &str) -> Answer {
     without_body(address, "GET", path, &[]).await
 }

@@ -8,7 +8,7 @@ fn streams_of_neighbouring_seeds_and_attempts_share_nothing() {
     for seed in 0..40 {
         for attempt in 0..40 {
             let mut stream = AttemptStream::new(seed, attempt);
-            // Several windows of each stream catch one that is another one shifted.
+            // Several windows of each stream catch a stream that is a shifted copy of another.
             for _ in 0..8 {
                 let window = [stream.unit(), stream.unit(), stream.unit()].map(f32::to_bits);
                 assert!(seen.insert(window), "seed {seed}, attempt {attempt}");

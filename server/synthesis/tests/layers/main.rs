@@ -1,4 +1,4 @@
-//! Tests of the core, grouped by its layers. What several of them need is built in [`fixtures`], and only there.
+//! Tests of the core, grouped by its layers. Shared objects, hands and searches are built in [`fixtures`], and only there.
 
 mod base;
 mod prelude;

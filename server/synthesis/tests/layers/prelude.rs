@@ -1,4 +1,4 @@
-//! What nearly every test uses.
+//! Imports of nearly every test.
 
 pub(crate) use crate::fixtures::{
     atlases::*,

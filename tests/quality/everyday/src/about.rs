@@ -1,4 +1,4 @@
-//! What is known about an object apart from its shape, and the files made of it.
+//! Properties of an object apart from its shape, and the files made of it.
 
 use std::fmt::Write as _;
 
@@ -12,13 +12,13 @@ use serde::Deserialize;
 pub struct EverydayObject {
     /// In kebab case; unique, and an object's id on the server.
     pub name: &'static str,
-    /// What it is, in a few words.
+    /// Description in a few words.
     pub what: &'static str,
     /// Edges of the real thing's bounding box along x, y and z, in millimetres; the mesh keeps to them.
     pub size_mm: [f64; 3],
     /// Where size and mass are from.
     pub source: Source,
-    /// What skin touches.
+    /// The material that skin touches.
     pub surface: Surface,
     /// Groups of the mesh, each with its mass.
     pub parts: Vec<Part>,
@@ -31,7 +31,7 @@ pub struct EverydayObject {
     pub(crate) shape: Shape,
 }
 
-/// What a hand touches. Coefficients are static, of dry or slightly moist fingers that press with a few newtons to some
+/// A material. Coefficients are static, of dry or slightly moist fingers that press with a few newtons to some
 /// tens; the README names their sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -52,7 +52,7 @@ pub enum Surface {
     Cloth,
     /// Leather.
     Leather,
-    /// Bricks and what else is as rough as sandpaper.
+    /// Bricks and surfaces as rough as sandpaper.
     Rough,
     /// Fruit, eggshell, leaves, wax.
     Natural,
@@ -121,11 +121,11 @@ pub enum Fill {
 /// Whether one hand can hold an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hands {
-    /// It can.
+    /// One hand suffices.
     One,
-    /// It takes two.
+    /// The object takes two hands.
     Beyond {
-        /// What one hand lacks.
+        /// Why one hand does not suffice.
         why: &'static str,
     },
 }
@@ -138,7 +138,7 @@ pub enum Source {
     Standard,
     /// Data sheets of common products.
     Product,
-    /// Typical sizes of what grows or is built by hand.
+    /// Typical sizes of things that grow or are built by hand.
     Typical,
 }
 

@@ -1,7 +1,7 @@
 //! Everyday objects, from a needle to a chair: meshes of a few kinds of shapes, with the sizes and masses of real ones and the friction
-//! of skin on what they are made of.
+//! of skin on their materials.
 //!
-//! The judge of quality measures on them how much of what a hand can take the service takes. The README next to this crate lists the objects and their sources.
+//! The judge measures how many of them the service takes. The README next to this crate lists the objects and their sources.
 
 mod about;
 mod mesh_builder;

@@ -136,7 +136,7 @@ impl MeshBuilder {
 
     /// Drops vertices that no triangle uses, centres the mesh on its bounding box and rounds it to micrometres.
     ///
-    /// Rounding makes the file's decimals exact and hides what the last bits of the arithmetic were.
+    /// Rounding makes the file's decimals exact and hides the last bits of the arithmetic.
     pub(crate) fn finish(mut self) -> Shape {
         self.drop_unused();
         let low = self

@@ -55,7 +55,7 @@ struct Object<'a> {
     surface: Surface,
     #[serde(default, borrow)]
     forbidden: Vec<&'a str>,
-    /// What one hand lacks; `None` if one suffices.
+    /// Why one hand does not suffice; `None` if it does.
     #[serde(borrow)]
     two_hands: Option<&'a str>,
     shapes: Vec<Shape<'a>>,

@@ -35,13 +35,13 @@ impl Sketch {
         self.parts.push(Part { name, fill });
     }
 
-    /// Places what follows: its origin, the direction of its y axis, and how much it is stretched along its axes.
+    /// Places the following shapes: their origin, the direction of their y axis, and how much they are stretched along their axes.
     pub(crate) fn place(&mut self, origin: DVec3, up: DVec3, stretch: DVec3) {
         let tilt = DQuat::from_rotation_arc(DVec3::Y, up.normalize());
         self.frame = DAffine3::from_rotation_translation(tilt, origin) * DAffine3::from_scale(stretch);
     }
 
-    /// A body of revolution about the y axis with so many corners. The profile of radii and heights goes from the bottom, outside, to
+    /// A body of revolution about the y axis. The profile of radii and heights goes from the bottom, outside, to
     /// where the surface ends on the axis; ends off the axis are closed by discs.
     pub(crate) fn lathe(&mut self, corners: usize, profile: &[[f64; 2]]) {
         let rings = profile.iter().map(|&[radius, height]| {

@@ -1,4 +1,4 @@
-//! The objects are what they say: sound meshes of the stated sizes, masses and names.
+//! The objects are sound meshes of the stated sizes, masses and names.
 
 use std::collections::HashSet;
 

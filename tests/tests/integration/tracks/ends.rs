@@ -1,4 +1,4 @@
-//! How tracks end, and what they never do: wait, queue, or go on for nobody.
+//! How tracks end; they never wait, queue, or go on for nobody.
 
 use std::time::{Duration, Instant};
 
@@ -116,10 +116,10 @@ async fn tracks_end_with_unavailable_at_shutdown() {
     bounded("the shutdown", stopping.stopped()).await;
 }
 
-/// Answers that the server may be ahead of what was read.
+/// Largest number of answers by which the server may be ahead of the reader.
 const FEW: usize = 6;
 
-/// A frame of a client that has read so many answers.
+/// A frame of a client that has read `answers_read` answers.
 fn after(answers_read: u64, sequence: u64) -> v1::TrackFrame {
     v1::TrackFrame {
         answers_read: Some(answers_read),
@@ -141,11 +141,11 @@ async fn a_reader_who_comes_back_meets_few_old_answers() {
         answers.push(track.next().await.unwrap().sequence);
     }
     assert!(answers.len() <= FEW + 1, "{answers:?}");
-    // Who reads on has an answer to each frame.
+    // A client that reads on has an answer to each frame.
     for sequence in last + 1..last + 30 {
         track.ask(after(FEW as u64 + sequence - last, sequence)).await;
     }
-    // Who has a call for each frame has read the answers before.
+    // A client with a call for each frame has read the answers before.
     let pushed = Created::remote(&server).await;
     for sequence in 0..3 * FEW as u64 {
         pushed.ask(after(0, sequence)).await;
@@ -201,7 +201,7 @@ async fn a_track_without_frames_ends_and_one_with_frames_outlives_its_calls() {
 /// Longer than any test takes.
 const LONG: Duration = Duration::from_secs(10);
 
-/// A track whose frames are searched for as long as this, and a frame.
+/// A track whose frames exhaust this budget, and a frame.
 async fn hopeless(server: &TestServer, budget: Duration) -> (Created<'_>, v1::TrackFrame) {
     let blocked = crate::fixtures::impossible(server).await;
     let track = v1::Track::from(blocked.clone()).with_budget(budget);

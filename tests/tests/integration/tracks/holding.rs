@@ -1,4 +1,4 @@
-//! What becomes of the grasp: what a track begins with and changes to, while the giver moves, and while hands are lost.
+//! The grasp of a track: at its start, through changes, while the giver moves, and while hands are lost.
 
 use glam::Vec3;
 use grasp_proto::v1::{self, CurrentGraspStatus, presenting_hand::Form};
@@ -114,7 +114,7 @@ async fn gives_a_committed_grasp_up_until_the_hand_no_longer_closes() {
     ]
     .map(|wrist| pose_of(wrist).position);
     assert!((0.02..0.5).contains(&from.distance(to)), "{from} to {to}");
-    // Nothing is in the way any more, but the hand has begun to withdraw.
+    // Nothing is in the way, but the hand has begun to withdraw.
     let still = track.ask(committed(3)).await.current.unwrap();
     assert_eq!(
         (still.status(), still.failed_check),
@@ -186,7 +186,7 @@ async fn a_track_begins_with_a_current_grasp() {
     assert!(!kept.contacts.is_empty(), "the first answer is whole");
     let answer = next.ask(frame(1, Pose::IDENTITY)).await;
     assert!(answer.grasp.expect("it is kept").contacts.is_empty());
-    // One that is not valid is followed by one near it.
+    // An invalid hand is replaced by a grasp near it.
     let wrist = pose_of(found.object_from_wrist());
     let deep = v1::HandPose {
         object_from_wrist: Some(wire_pose(wrist * Pose::from_position(Vec3::Y * -0.03))),
@@ -226,7 +226,7 @@ async fn a_track_changes_its_object_and_begins_without_a_grasp_there() {
         (CurrentGraspStatus::Replanned, None)
     );
     let grasp = answer.grasp.expect("a grasp");
-    // It is one of the scissors.
+    // The grasp is of the scissors.
     let request = |object: &str| {
         v1::ValidateGraspRequest::new(object)
             .with_client_from_object(other(3).client_from_object())
@@ -237,11 +237,11 @@ async fn a_track_changes_its_object_and_begins_without_a_grasp_there() {
     assert!(valid.into_inner().valid);
     let valid = client.validate_grasp(request("objects/remote")).await.unwrap();
     assert!(!valid.into_inner().valid);
-    // It stays the object of later frames.
+    // The scissors stay the object of later frames.
     let kept = track.ask(free(4)).await;
     assert_eq!(kept.status(), CurrentGraspStatus::Kept);
     assert_eq!(kept.grasp.unwrap().object_from_wrist(), grasp.object_from_wrist());
-    // Pushed frames do the same.
+    // The same with pushed frames.
     let pushed = Created::remote(&server).await;
     pushed.ask(frame(0, Pose::IDENTITY)).await;
     let answer = pushed.ask(other(1)).await;
@@ -337,7 +337,7 @@ async fn a_lost_hand_is_where_it_was_at_the_object_and_its_joints_are_named() {
     let server = TestServer::start().await;
     let mut track = Tracked::remote(&server).await;
     let pushed = Created::remote(&server).await;
-    // Without any hand before, a lost one has no grasp.
+    // A hand that is lost from the start has no grasp.
     let mut lost = jointed(0, Pose::IDENTITY);
     LOSSES[0].1(joints_of(&mut lost));
     assert_wrong(&track.ask(lost.clone()).await, LOSSES[0].0);
@@ -359,7 +359,7 @@ async fn a_lost_hand_is_where_it_was_at_the_object_and_its_joints_are_named() {
         assert_blames(&answer, field);
         let grasp = answer.grasp.as_ref().expect("answers are full");
         assert_eq!(grasp.object_from_wrist(), found.object_from_wrist());
-        // As far from the giver as with the hand where it was.
+        // The distance from the giver is unchanged.
         let [now, before] = [grasp, &found].map(|grasp| {
             let clearance = grasp.margin(v1::Check::GiverClearance);
             clearance.expect("there is a giver")

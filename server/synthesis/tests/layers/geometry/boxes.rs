@@ -101,7 +101,7 @@ fn any_box(random: &mut Random) -> OrientedBox {
     )
 }
 
-/// Capsules of every kind, and ones along an edge of the box.
+/// Capsules of every kind, some along an edge of the box.
 fn any_capsule(random: &mut Random, around: &OrientedBox) -> TaperedCapsule {
     let start = around.object_from_box.position + random.in_cube() * 0.1;
     if random.index(6) > 0 {

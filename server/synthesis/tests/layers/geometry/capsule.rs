@@ -23,7 +23,7 @@ fn capsule(random: &mut Random, near: Vec3) -> TaperedCapsule {
     random.capsule(start)
 }
 
-/// Asserts that a distance is the least one found by brute force, but for the error of that.
+/// Asserts that a distance is the least one found by brute force, within its error.
 fn assert_least(distance: f32, sampled: impl Iterator<Item = f32>, accuracy: f32, slack: f32, what: &str) {
     let least = sampled.fold(f32::INFINITY, f32::min);
     let is_least = distance <= least + accuracy && distance >= least - slack;

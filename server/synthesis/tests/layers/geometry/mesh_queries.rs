@@ -1,4 +1,4 @@
-//! Queries on meshes: the closest point, what contains a point, what a segment crosses, and crowded surfaces.
+//! Queries on meshes: closest points, containment, crossings of segments, and crowded surfaces.
 
 use crate::prelude::*;
 use grasp_synthesis::{base::stop::Stopped, model::plain_object::PlainObject};

@@ -1,4 +1,4 @@
-//! What is derived of a mesh's shape: inner balls, local shape and thickness, opposed places, what is sharp.
+//! The shape of a mesh: inner balls, local shape and thickness, opposed places, sharp edges and points.
 
 use crate::fixtures::meshes::solids;
 use crate::prelude::*;
@@ -143,7 +143,7 @@ fn parts_are_as_thick_as_near_the_hand() {
     let ball = thickness(&sphere(0.03, 16));
     let expected = 0.03 * (2.0_f32 / 3.0).sqrt();
     assert_near(ball.near(Vec3::new(0.01, -0.02, 0.03)), expected, "a ball");
-    // What is far from the hand does not count.
+    // Parts far from the hand do not count.
     let stick = Parts::default().cuboid(Vec3::ZERO, Vec3::new(0.01, 0.65, 0.01), 1);
     let with_bar = stick
         .clone()

@@ -31,7 +31,7 @@ fn a_growth_that_is_not_enough_keeps_all() {
 }
 
 #[test]
-fn half_of_what_is_kept_holds_where_the_owner_wants_hands() {
+fn half_of_the_kept_grips_hold_where_the_owner_wants_hands() {
     let end = Region {
         wish: Wish::Prefer,
         weight: 1.0,
@@ -55,8 +55,8 @@ fn half_of_what_is_kept_holds_where_the_owner_wants_hands() {
     assert!(wanted >= CHOSEN / 2 && 2 * chance < wanted, "{chance} {wanted}");
 }
 
-/// 1 for a grip that is firm, off what is sharp, and on the handle or of what has none, and 2 if people would not choose
-/// differently, as far as hand and object tell.
+/// 1 for a grip that is firm, off sharp edges, and on the handle if there is one; 2 if it is also natural, as far as
+/// hand and object tell.
 fn grade_of(entry: &Entry) -> usize {
     let value = |term: Term| entry.grip_values[term as usize];
     let is_firm =
@@ -86,14 +86,14 @@ fn the_first_answer_is_the_first_of_the_best_grade() {
         let holding = |entry: &u16| holds[usize::from(*entry)].is_some();
         let best = by_score.iter().copied().filter(holding).map(grade).max();
         let is_best = |entry: &u16| holding(entry) && Some(grade(*entry)) == best;
-        // By value, only the best grade is tried.
+        // The list by value has only grips of the best grade.
         let mut listed = listed.iter().copied();
         let of_list = listed.find(|entry| holding(entry) && grade(*entry) == 4);
         let first = of_list.or_else(|| by_score.iter().copied().find(is_best));
         let found = guided(&holdout).atlas(&known).run();
         assert_eq!(found.report.source, first.map(GraspSource::Atlas), "{giver}");
         let Some(first) = first else { continue };
-        // Where both orders begin alike, they cannot be distinguished.
+        // Where both orders begin with the same grip, they cannot be told apart.
         if Some(first) != by_score.iter().copied().find(holding) {
             by_value += 1;
         }
@@ -234,7 +234,7 @@ proptest! {
         prop_assert!(decode_scissors(&bytes).is_err());
     }
 
-    // It gives an error or an atlas with usable indices and numbers, but no panic.
+    // Decoding fails or yields an atlas with usable indices and numbers; it does not panic.
     #[test]
     fn nonsense_with_a_valid_checksum_is_rejected_or_harmless(
         place in any::<prop::sample::Index>(),
@@ -267,10 +267,10 @@ fn the_listed_part_of_an_atlas_is_an_atlas_of_its_own() {
     let mut left = all.iter();
     assert!(!few.is_empty() && few.len() < all.len());
     assert!(few.iter().all(|grip| left.any(|other| other == grip)), "in order");
-    // They cannot pass for a complete atlas, nor for an interrupted growth.
+    // The part cannot pass for a complete atlas, nor for an interrupted growth.
     assert!(!listed.atlas.is_complete());
     assert_eq!((listed.proposed, listed.early_stamp), (0, grown.early_stamp));
-    // It round-trips like any other.
+    // The part round-trips like any other atlas.
     let bytes = encode(&listed, object, rig);
     assert_eq!(decode_scissors(&bytes).expect("it is whole"), listed);
 }

@@ -20,7 +20,7 @@ fn lists_oldest_first_and_drops_the_oldest() {
     let learn = |learned: Atlas, grip: &Entry| learned.with(right(), grip.clone(), MOST);
     let learned = grips[..40].iter().fold(Atlas::default(), learn);
     assert_eq!(learned.entries(), &grips[8..40]);
-    // What screens them follows.
+    // The data that screen them follow.
     assert_eq!(learned.grips(), &Grips::new(right(), grips[8..40].to_vec()));
     // A grip that is found again becomes the newest, and drops no other.
     let again = learn(learned.clone(), &grips[20]);
@@ -88,7 +88,7 @@ fn a_learned_grip_is_found_again_only_where_it_holds_and_may_be_used() {
 }
 
 #[test]
-fn what_the_atlas_answers_does_not_change_with_what_is_learned() {
+fn answers_of_the_atlas_do_not_change_with_learned_grips() {
     let known = complete_atlas("scissors");
     let (few, all) = (every(12, "scissors"), shipped_atlas("scissors"));
     let (mut by_atlas, mut by_learned) = (0, 0);
@@ -164,7 +164,7 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
             .map(|&entry| farthest_clearance(&known.entries()[usize::from(entry)], &giver))
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
-        // Without a giver, as many of the best.
+        // Without a giver, the same number of the best grips.
         let without_giver = of(holding, Barriers::NONE, false).expect("nothing stops it");
         let best = entries_of(&without_giver);
         assert!(best.len() >= 32 && holding.starts_with(&best));
@@ -202,7 +202,7 @@ fn attempts_seeded_by_known_grips_are_reproducible() {
     for first in [0, 9] {
         let found = search(&holdout, seeds(), first..2000).run();
         let attempt = found.report.attempt().expect("a perturbed grip holds");
-        // The same for any number of workers, and for that attempt alone.
+        // The grasp is the same for any number of workers, and for that attempt alone.
         let by_three = search(&holdout, seeds(), first..2000).workers(3).run();
         assert_eq!(
             (&by_three.grasp, by_three.report.attempt()),

@@ -44,7 +44,7 @@ fn mirror_images_of_grips_hold_a_symmetric_object() {
         }
     }
     assert!(images.next().is_none());
-    // Those that touch sharp edges, of which a cuboid has many.
+    // Grips at the sharp edges of the cuboid are missing.
     assert!(held > 100 && 8 * missing <= held, "{held} {missing}");
 }
 
@@ -59,7 +59,7 @@ fn only_symmetric_objects_have_a_plane_of_symmetry() {
         Mirror::of_symmetric(prepared(&Arc::new(object_of(bent.mesh(), &[])))),
         None
     );
-    // What may not be touched counts, and so does where the weight is.
+    // Forbidden triangles and the centre of mass must be symmetric, too.
     let mesh = || {
         Parts::default()
             .cuboid(Vec3::ZERO, Vec3::new(0.02, 0.06, 0.015), 1)
@@ -135,7 +135,7 @@ fn a_hand_follows_the_surface() {
                 let beyond = contact.position.abs() - scale * HALF;
                 assert!(beyond.max_element().abs() < 1e-4, "{scale}: {beyond}");
             }
-            // The wrist keeps its place at the surface, but for what the digits need.
+            // The wrist keeps its place at the surface, except as far as the digits need.
             let grown_by = (scale - 1.0).abs() * pose.frame_from_wrist.position.length();
             let shift = hand
                 .frame_from_wrist

@@ -66,7 +66,7 @@ fn region(wish: Wish, weight: f32, triangles: &[u32], from_x: Option<f32>) -> Re
 }
 
 #[test]
-fn contacts_earn_the_weight_of_what_they_are_on() {
+fn contacts_earn_the_weight_of_their_region() {
     let regions = Regions::new(
         &[
             region(Wish::Prefer, 0.8, &[1], None),
@@ -75,7 +75,7 @@ fn contacts_earn_the_weight_of_what_they_are_on() {
         ],
         10,
     );
-    // On 0.8, on 0.4 by its triangle, on 0.4 by its place, on that and on what is to be avoided.
+    // On 0.8; on 0.4 by its triangle; on 0.4 by its place; on that and on a region to avoid.
     let contacts = [on(1, 0.0), on(2, 0.0), on(3, 6.0), on(4, 8.0)];
     let [preferred, avoided] = regions
         .values(&contacts)

@@ -55,7 +55,7 @@ fn assert_sound(contacts: &[SoftContact], load: &Load, balance: &Balance, what: 
 
 /// Two opposed contacts carry a weight if and only if each can push with half of it along the edge of its cone.
 #[test]
-fn a_pinch_holds_exactly_what_friction_carries() {
+fn a_pinch_holds_exactly_the_weight_that_friction_carries() {
     let places = [(Vec3::X * 0.03, Vec3::X), (Vec3::NEG_X * 0.03, Vec3::NEG_X)];
     for friction in [0.34_f32, 0.5, 1.0] {
         let contacts = contacts_at(&places, friction, 0.004);

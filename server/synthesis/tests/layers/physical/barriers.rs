@@ -9,7 +9,7 @@ use grasp_synthesis::physical::receiver::{Receiver, SUITABLE};
 /// How much closer than other hands obstacles may be, in metres.
 const CLOSER: f32 = 0.0009;
 
-/// A hand of known joints, or one of which only the mesh is known, which is a ball; and its solids.
+/// A hand by its joints, or by a mesh alone, which is a ball; and its solids.
 fn any_presenting(random: &mut Random, is_ball: bool) -> (PresentingHand, Vec<TaperedCapsule>) {
     if is_ball {
         let (centre, radius) = (random.in_cube() * 0.08, random.between(0.01, 0.04));
@@ -108,7 +108,7 @@ fn clearances_and_verdicts_match_all_pairs() {
             }
         }
 
-        // Spheres inside the hand: what is certainly near them is near the hand, and their bounds hold.
+        // Spheres inside the hand: a solid certainly near them is near the hand, and their bounds hold.
         let HandSolids { phalanges, .. } = receiver.hand;
         let links = phalanges.as_flattened();
         let spheres = Spheres::new(|i| (links[i].at(0.5), links[i].radius_at(0.5)));

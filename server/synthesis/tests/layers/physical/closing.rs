@@ -66,7 +66,7 @@ fn a_digit_that_starts_inside_does_not_close() {
     let digit = finger();
     let around_the_tip = cuboid(Vec3::new(-0.02, 0.07, -0.02), Vec3::new(0.02, 0.12, 0.02));
     assert!(closing(&around_the_tip, &digit, 1.0).close().is_none());
-    // Nor where a sheet thinner than the finger cuts through it.
+    // The same where a sheet thinner than the finger cuts through it.
     let sheet = cuboid(Vec3::new(-0.05, 0.05, -0.05), Vec3::new(0.05, 0.0505, 0.05));
     assert!(closing(&sheet, &digit, 1.0).close().is_none());
 }

@@ -145,7 +145,7 @@ fn sets_of_six(count: usize) -> impl Iterator<Item = u32> {
 }
 
 /// Unit normal of the plane through six points, perpendicular to their five edges, by elimination with full pivoting;
-/// none if they span no plane.
+/// `None` if they span no plane.
 fn normal_of_plane(points: &[[f64; 6]]) -> Option<[f64; 6]> {
     let mut rows: [[f64; 6]; 5] =
         std::array::from_fn(|k| std::array::from_fn(|i| points[k + 1][i] - points[0][i]));

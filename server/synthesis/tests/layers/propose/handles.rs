@@ -53,13 +53,13 @@ fn the_ear_of_a_pot_is_its_handle_and_a_spout_is_not() {
     let main: Vec<&Handle> = prepared(&pot).handles().main().collect();
     assert!(main.len() >= 4, "{}", main.len());
     assert!(main.iter().all(|handle| handle.middle.x > 0.045), "{main:?}");
-    // What is off the ear is not on the handle.
+    // Points off the ear are not on the handle.
     assert!(!prepared(&pot).handles().contain(Vec3::new(-0.085, 0.008, 0.0)));
     assert!(!prepared(&pot).handles().contain(Vec3::new(0.0, 0.05, 0.0)));
 }
 
 #[test]
-fn what_fingers_cannot_wrap_is_no_handle() {
+fn shapes_that_fingers_cannot_wrap_have_no_handle() {
     for (name, mesh) in [
         ("ball", sphere(0.025, 24)),
         ("wire", cylinder_mesh(0.002, 0.2, 12, 4)),

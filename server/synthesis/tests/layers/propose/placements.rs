@@ -82,7 +82,7 @@ fn cached_placements_leave_the_hand_room() {
 
 #[test]
 fn evicts_the_first_of_too_many_hands() {
-    // Other tests use the shared one with other hands.
+    // Not the shared object, which other tests use with other hands.
     let remote = PreparedObject::new(Arc::clone(object("remote")));
     let scales = [1.0, 1.01, 1.02, 1.03, 1.04];
     let hands = scales.map(|scale| PreparedRig::new(adult(Handedness::Left).mirrored().scaled(scale)));

@@ -17,7 +17,7 @@ fn primitives_of_the_right_hand() -> &'static Arc<[HeldPrimitive]> {
     held
 }
 
-/// What an object takes over from the primitives of the right hand.
+/// The grips transferred to an object from the primitives of the right hand.
 fn transferred_to(object: &GraspObject) -> TransferredGrips {
     TransferredGrips::of(object, primitives_of_the_right_hand())
 }

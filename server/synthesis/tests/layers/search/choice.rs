@@ -65,7 +65,7 @@ fn an_observer_sees_every_valid_grasp_whatever_the_number_of_workers() {
     many.sort_by_key(index);
     let grasps = |all: &[FoundGrasp]| -> Vec<_> { all.iter().map(|found| found.grasp.clone()).collect() };
     assert_eq!(grasps(&one), grasps(&many));
-    // With where the receiver stands, which the score needs, too.
+    // The score also needs to know where the receiver stands.
     assert!(one.iter().all(|found| found.grasp.score.is_some()));
 }
 
@@ -119,7 +119,7 @@ fn the_best_of_the_best_classes_remain_in_whatever_order_they_come() {
     for round in 0..200 {
         let (most, number) = (1 + random.index(9), random.index(120));
         let mut offered = made_up(&mut random, &grasp, number);
-        // By force: the best of each class, then the best of those.
+        // By brute force: the best of each class, then the best of those.
         let mut best = offered.clone();
         best.sort_by(better);
         let mut classes = Vec::new();
@@ -214,7 +214,7 @@ fn the_part_is_the_region_with_most_contacts_or_an_eighth_of_the_box() {
     assert_eq!(part(&object, &[on(0.0, 9)]), Some(Part::Region(None)));
 }
 
-/// Attempts after the first valid one of which another is preferred if a person would choose it.
+/// Attempts after the first valid grasp in which a natural grasp replaces it.
 const WINDOW: u64 = 16;
 
 const SEEDS: u64 = 12;
@@ -251,7 +251,7 @@ fn expected(holdout: &Holdout, seed: u64) -> (u64, Grasp) {
 }
 
 #[test]
-fn a_grasp_that_people_would_choose_replaces_another_within_some_attempts() {
+fn a_natural_grasp_replaces_another_within_some_attempts() {
     let mut replaced = 0;
     let held = tracked_holdouts().nth(3).expect("there are fifteen");
     let floating = ["remote", "scissors"].map(|name| floating(Arc::clone(object(name))));
@@ -279,7 +279,7 @@ fn a_grasp_that_people_would_choose_replaces_another_within_some_attempts() {
 const PROPOSALS: u64 = 1500;
 
 #[test]
-fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
+fn refinement_keeps_valid_hands_and_perturbs_near_misses_until_more_hold() {
     let scissors = object("scissors");
     let around = surroundings(scissors, &NO_GIVER, right());
     let place = place(scissors, right());
@@ -305,10 +305,10 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
             (Err(_), Ok(grasp)) => {
                 refined += 1;
                 assert!(guided(&free).judge(&grasp.pose).is_valid(), "{index}");
-                // It is not the proposed hand.
+                // The refined hand differs from the proposed one.
                 assert_ne!(grasp.pose.digits.as_slice(), plain.posed.as_slice());
             }
-            // Whatever was tried, a failed hand is reported as without refinement.
+            // A failed refinement reports the hand and error without it.
             (first, end) => {
                 assert_eq!(first, end, "{index}");
                 assert_eq!(plain.posed, refining.posed, "{index}");

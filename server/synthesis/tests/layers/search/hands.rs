@@ -152,7 +152,7 @@ fn a_lunch_box_hangs_in_hooked_fingers() {
             assert!(grasp.hangs && requirements.admits(&grasp));
             assert_eq!(grasp.classification.grasp_type, Some(GraspType::FixedHook));
             assert_holds(&grasp, up);
-            // Under another direction of gravity, it would fall.
+            // Under another direction of gravity, the load would not be balanced.
             assert!(Entry::of_grasp(&grasp).is_none());
         }
     }

@@ -98,7 +98,7 @@ fn with_surroundings(holdout: Holdout) -> Holdout {
 }
 
 #[test]
-fn ratings_count_what_verdicts_say_of_every_known_grip() {
+fn ratings_count_the_verdicts_on_every_known_grip() {
     let mut causes = [0; 6];
     for (place, holdout) in tracked_holdouts().enumerate().step_by(4) {
         let atlas = every(10, name_of(&holdout.object));
@@ -136,7 +136,7 @@ fn ratings_count_what_verdicts_say_of_every_known_grip() {
 }
 
 #[test]
-fn a_stopped_rating_counts_what_it_has_checked() {
+fn a_stopped_rating_counts_the_grips_it_has_checked() {
     use std::sync::atomic::{AtomicUsize, Ordering};
     let holdout = tracked_holdouts().next().expect("there are holdouts");
     let search = guided(&holdout).atlas(&every(10, name_of(&holdout.object)));
@@ -201,7 +201,7 @@ fn look_ups_find_a_grip_exactly_where_one_is_clear_of_everything() {
     for setting in 0..settings {
         let mut holdout = crowded(&mut random);
         if setting % 3 == 0 {
-            // Among twice as many, often nothing is clear.
+            // Twice the number often leaves no clear grip.
             let more = crowded(&mut random);
             holdout.other_hands.extend(more.other_hands);
             holdout.obstacles.extend(more.obstacles);

@@ -118,7 +118,7 @@ fn key_frames_open_the_hand_far_and_near_and_end_in_the_grasp() {
         };
         widened.push(aperture(&pre_grasp.pose) - aperture(&close.pose));
     }
-    // As with people, the thumb and the first finger that holds are some centimetres farther apart than in the grasp, except
+    // As with people, the thumb and the first holding finger are some centimetres farther apart than in the grasp, except
     // where the thumb lies across a finger.
     let mean = widened.iter().sum::<f32>() / widened.len() as f32;
     assert!((0.02..0.06).contains(&mean), "{mean} m");
@@ -192,7 +192,7 @@ fn hands_approach_only_within_the_allowed_cone() {
         }
         // All directions tried are within 80° of the natural one, so none is within 57° of its opposite.
         assert_eq!(motion_from(planned, -natural, 1.0), None, "{}", planned.name);
-        // A cone without the free choice: another motion, or none.
+        // A cone that excludes the unconstrained motion: another motion, or `None`.
         let side = free.any_orthonormal_vector();
         let side = if number % 2 == 0 { side } else { -side };
         let axis = (free * 0.5 + side).normalize_or_zero();

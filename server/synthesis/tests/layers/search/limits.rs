@@ -1,4 +1,4 @@
-//! What limits one hand, in closed forms; and that nothing is called impossible for which there is a grasp.
+//! The limits of one hand, in closed forms; objects with a grasp have none.
 
 use grasp_synthesis::{
     physical::immobility::{MAX_CONTACT_FORCE, MAX_CONTACTS},
@@ -36,7 +36,7 @@ fn a_box_heavier_than_all_contacts_carry_is_limited_by_mass() {
     let limit = only(&limits_of(cube(80.0)));
     assert_eq!((limit.check, limit.value), (Check::Mass, 80.0));
     let carried = MAX_CONTACTS as f32 * MAX_CONTACT_FORCE / 9.81;
-    // And 2 % may be unbalanced.
+    // The balance check tolerates 2 % of the weight.
     assert!(
         (limit.bound.unwrap() / carried - 1.0 / 0.98).abs() < 1e-3,
         "{limit:?}"
@@ -181,7 +181,7 @@ fn everyday_objects() -> Vec<(String, Arc<GraspObject>)> {
 }
 
 #[test]
-fn what_is_found_has_no_limits() {
+fn objects_with_a_grasp_have_no_limits() {
     let mut random = Random::new(22);
     let mut found = 0;
     for (name, object) in everyday_objects() {

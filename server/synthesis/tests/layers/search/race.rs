@@ -22,7 +22,7 @@ fn hash(outcome: &SearchOutcome) -> u64 {
     let report = &outcome.report;
     add(report.attempts);
     add(report.pruned_placements);
-    // Only the kinds of the thesis' Table 5.2: others were added after the golden hash.
+    // The golden hash covers only the kinds of the thesis' Table 5.2.
     for rejection in Rejection::THESIS {
         add(report.rejections[rejection.index()]);
     }
@@ -68,8 +68,8 @@ fn assert_same(search: &Search<'_>, one: &SearchOutcome, pools: &[(usize, usize)
     }
 }
 
-/// The answers of the searches in [`reproducible_searches_match_for_any_number_of_workers`], bit for bit. It changes
-/// with every change of a draw or a rounding.
+/// The answers of the searches in [`reproducible_searches_match_for_any_number_of_workers`], bit for bit. Any change of a draw
+/// or a rounding changes it.
 const GOLDEN: u64 = 0x1594_CA74_F345_7B4E;
 
 #[test]
@@ -117,7 +117,7 @@ fn exhausted_searches_match_for_any_number_of_workers_and_report_the_nearest_mis
     assert_eq!(lowest, miss.wrench_angle.map(|angle| (angle, miss.attempt)));
 }
 
-/// The winner comes after so many attempts that workers merge their counts on the way.
+/// The winner comes late enough that workers merge their counts on the way.
 #[test]
 fn late_winners_match_for_any_number_of_workers() {
     let holdout = held(rod());

@@ -54,7 +54,7 @@ fn depth_is_that_of_the_deepest_sphere_in_a_box() {
         assert!((figure - expected).abs() < 3e-5, "{figure} {expected}");
         assert_eq!(depth.passed, figure <= MAX_PENETRATION + 5e-6);
         if figure > 0.0 {
-            // It is measured on the box, within the part that is named.
+            // The depth is measured on the box, within the named part of the hand.
             let at = depth.at.expect("a depth is somewhere");
             assert!(((at.abs() - half).max_element()).abs() < 1e-4, "{at}");
             let part = depth.part.expect("a depth is of a part");
@@ -145,7 +145,7 @@ fn angles_beyond_limits_and_open_hands_fail_their_own_checks() {
     let unbalanced = verdict(&judged, Check::Balance).figure.expect("a share");
     // Nothing carries the weight, nor its torque about the middle of no contacts.
     assert!(unbalanced >= 1.0 - 1e-4, "{unbalanced}");
-    // Without the thumb, the force that is left over is what the others cannot give.
+    // Without the thumb, the other digits leave some of the weight unbalanced.
     let mut released = grasp.pose;
     released.digits[0] = right().stretched()[0];
     let judged = search.judge(&released);

@@ -17,7 +17,7 @@ fn scenes() -> [Holdout; 4] {
     [floating(bar()), held(bar()), held(plate()), held(rod())]
 }
 
-/// From the same stream, the first placement with all measures in range is returned, after as many prunes.
+/// Both orders of checks return the same placement of a stream, after the same number of prunes.
 #[test]
 fn the_cheap_order_of_checks_accepts_the_same_as_the_plain_order() {
     let rig = simple_rig();

@@ -141,7 +141,7 @@ fn collisions_are_reported_by_part() {
         holdout
     };
     for (half, giver, wrist, expected) in [
-        // In the palm or around the fingertips is the object or, where that is far away, the giver.
+        // The object, or the giver if the object is far away, is in the palm or around the fingertips.
         (0.02, None, far, None),
         (0.02, None, -palm, of_palm),
         (0.02, None, -fingers, of_finger),

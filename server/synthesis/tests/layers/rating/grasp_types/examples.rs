@@ -152,7 +152,7 @@ fn most_thesis_examples_match_their_captions() {
 const SEEDS: u64 = 24;
 
 #[test]
-fn what_is_flat_long_or_round_is_not_held_as_something_else() {
+fn flat_long_and_round_objects_get_no_types_of_other_shapes() {
     let block = |x: f32, y: f32, z: f32| cuboid(Vec3::new(x, y, z), 4);
     let rod = |radius| cylinder_mesh(radius, 0.09, 24, 12);
     let not_flat = "Sphere, Disk";

@@ -34,7 +34,7 @@ const ACROSS_FINGERS: Vec3 = Vec3::new(0.97, 0.24, 0.0);
 const PEN: Shape = Shape::Rod(Vec3::new(20.0, 105.0, 60.0), Vec3::new(0.3, 0.6, 0.75), 4.0);
 const NEXT_TO_INDEX: Shape = Shape::Plate(Vec3::new(36.0, 110.0, 35.0), Vec3::X, 1.0);
 
-/// The same link of the thumb or a finger and of others up to a finger.
+/// The same link of each digit in a range.
 fn links(digits: std::ops::RangeInclusive<usize>, phalanx: Phalanx, along: f32) -> Vec<Touching> {
     let digits = Digit::ALL[digits].iter();
     digits.map(|&digit| (digit, phalanx, along)).collect()

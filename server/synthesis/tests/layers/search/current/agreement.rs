@@ -46,7 +46,7 @@ fn first_failure(judged: &Judgement, requirements: &Requirements) -> Option<(Che
 fn assert_fails_as_judged(failed: &FailedCheck, (check, figure): (Check, Option<f32>), what: &str) {
     assert_eq!(failed.check, check, "{what}: {failed}");
     let value = match (check, failed.figure, failed.bound) {
-        // A verdict says how much too long the way is, whatever limits it.
+        // The figure of a verdict is the excess over the limit.
         (Check::Reach, Some(distance), Some(longest)) => Some(distance - longest),
         (Check::Reach, ..) => Some(0.0),
         (_, figure, _) => figure,
@@ -57,7 +57,7 @@ fn assert_fails_as_judged(failed: &FailedCheck, (check, figure): (Check, Option<
     }
 }
 
-/// Asks for a current hand, and for the verdicts on it; the check that it failed, or none if it was kept.
+/// Settles a current hand and compares the result with its verdicts; the failed check, `None` if the hand was kept.
 fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Check> {
     let after = search.clone().current(CurrentGrasp {
         is_committed: true,
@@ -178,7 +178,7 @@ fn constrained(random: &mut Random, hand: &HandPose) -> Requirements {
 }
 
 #[test]
-fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
+fn a_current_grasp_is_kept_or_fails_as_its_verdicts_say() {
     let mut random = Random::new(41);
     let names = holdouts();
     let mut reasons: Vec<Option<Check>> = Vec::new();
@@ -244,7 +244,7 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
 }
 
 #[test]
-fn what_hangs_falls_by_what_its_verdicts_say() {
+fn a_hanging_grasp_fails_the_checks_that_its_verdicts_name() {
     let holdout = floating(lunch_box(0.03));
     let hooking = guided(&holdout).requirements(without_thumb()).max_attempts(3_000);
     let grasp = hooking.grasp().expect("it hangs in fingers");
@@ -302,7 +302,7 @@ fn a_committed_hand_that_a_giver_meets_is_opened_and_drawn_back() {
 }
 
 #[test]
-fn the_absence_of_a_grasp_is_explained_by_limits_or_by_what_known_grips_fail() {
+fn the_absence_of_a_grasp_is_explained_by_limits_or_by_failed_checks_of_known_grips() {
     let atlas = shipped_atlas("scissors");
     let free = floating(Arc::clone(object("scissors")));
     let none = Requirements::default();

@@ -8,7 +8,7 @@ use grasp_synthesis::{
 use super::{after, current, settled, way};
 use crate::prelude::*;
 
-/// The pose as it returns from a client.
+/// The pose after its way to a client and back.
 fn through_the_wire(pose: &HandPose) -> HandPose {
     let joint = openxr_from_thesis_frame(pose.frame_from_wrist);
     HandPose {
@@ -18,7 +18,7 @@ fn through_the_wire(pose: &HandPose) -> HandPose {
 }
 
 #[test]
-fn keeps_what_a_search_found_on_every_built_in_holdout() {
+fn keeps_the_grasp_found_on_every_built_in_holdout() {
     let mut cases = 0;
     for (holdout, built_in) in tracked_holdouts().zip(holdouts()) {
         let name = &built_in.name;
@@ -74,7 +74,7 @@ fn the_nearest_learned_grip_follows_where_the_atlas_has_none() {
         let answer = outcome.grasp.expect("there is one");
         assert!(of(&answer) <= 1.25 * nearest + 1e-5);
         followed += 1;
-        // With an atlas that has a valid grip, that follows, however far it is.
+        // A valid grip of the atlas replaces it, however far it is.
         let with_atlas = after(&holdout, &known, current(failed))
             .learned(learned(&valid))
             .reproducible(false);
@@ -154,7 +154,7 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
                     entry.grip.holding_digits()
                 }
             );
-            // Now it is kept as it is.
+            // The adjusted grasp is kept as it is.
             let (_, verdict) = settled(after(&holdout, &atlas, current(adjusted.pose)).settle());
             assert_eq!(verdict.status, CurrentGraspStatus::Kept);
         }
@@ -163,7 +163,7 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
     assert!(idle > 20 && stuck * 4 < idle && lifted > 20, "{counts:?}");
 }
 
-/// Least distance of what follows a grasp from where hands were lately.
+/// Least distance of a replacement from the recent places of hands.
 const STEADY: f32 = GIVER_CLEARANCE + 0.002;
 
 /// Rounding of distances, in metres.
@@ -202,7 +202,7 @@ fn approached(holdout: &Holdout, hand: &HandPose, wanted: f32) -> Holdout {
 }
 
 #[test]
-fn within_its_grace_a_grasp_is_kept_with_what_it_is_short_of() {
+fn within_its_grace_a_grasp_is_kept_with_its_shortfall() {
     let atlas = shipped_atlas("scissors");
     let mut cases = 0;
     for giver in (0..atlas.entries().len()).step_by(61) {
@@ -253,7 +253,7 @@ fn within_its_grace_a_grasp_is_kept_with_what_it_is_short_of() {
 }
 
 #[test]
-fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
+fn a_replacement_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
     let atlas = shipped_atlas("scissors");
     let (mut steady, mut spared) = (0, 0);
     for giver in (0..atlas.entries().len()).step_by(9) {
@@ -292,7 +292,7 @@ fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
                 assert_eq!(verdict.status, CurrentGraspStatus::Replanned);
                 let follower = outcome.grasp.expect("a grip is valid").pose;
                 assert_eq!(is_steady(&follower), any, "giver {giver}");
-                // Only where nothing steady follows is the grasp itself kept.
+                // The grasp itself is kept only if no steady grip replaces it.
                 let patient = CurrentGrasp {
                     grace: Grace {
                         always: 0.0,

@@ -1,4 +1,4 @@
-//! The current grasp: when it is kept, adjusted, replaced or aborted, and by what it is followed.
+//! The current grasp: when it is kept, adjusted, replaced or aborted, and its replacement.
 
 mod agreement;
 mod kept;
@@ -132,7 +132,7 @@ fn only_a_grip_that_is_better_by_enough_replaces_a_valid_grasp() {
 }
 
 #[test]
-fn attempts_after_a_fallen_grasp_find_nearer_hands_whatever_the_number_of_workers() {
+fn attempts_after_a_failed_grasp_find_nearer_hands_whatever_the_number_of_workers() {
     let atlas = shipped_atlas("scissors");
     let (mut near, mut far, mut cases) = (0.0, 0.0, 0);
     for giver in (0..atlas.entries().len()).step_by(31) {
