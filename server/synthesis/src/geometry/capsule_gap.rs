@@ -14,11 +14,10 @@ use super::{
     wide_bvh::{Node, TrianglePack, WideBvh},
 };
 
-/// Slack of the lower bounds, in metres: exceeds all rounding for coordinates up to a metre, and is a hundredth of
-/// what matters to a hand.
+/// Slack of the lower bounds, in metres: exceeds all rounding for coordinates up to a metre.
 const SLACK: f32 = 1e-6;
 
-/// How much closer a triangle must be to replace the one found so far, in metres: the accuracy of the result.
+/// How much closer a triangle must be to replace the closest so far, in metres: the accuracy of the result.
 const ACCURACY: f32 = 1e-5;
 
 /// Floor of determinants of two directions before division, in m⁴: positive, and below that of two perpendicular micrometres.

@@ -1,6 +1,6 @@
 //! Sharp edges and points of a mesh, which nobody touches if they can help it.
 //!
-//! Blades of scanned and of rounded models end in a face or a curve a millimetre thick. They are found by what is behind the
+//! Blades of scanned and of rounded models end in a face or a curve a millimetre thick. They are found by the wedge behind the
 //! end: two faces at a small angle, between which the part grows thicker.
 
 use std::collections::{HashMap, HashSet};
@@ -30,11 +30,10 @@ const MIN_LENGTH: f32 = 0.01;
 /// Largest sum of the angles at a vertex, in radians, that makes it a point: that of a cone with half an angle of 20° at its tip.
 const POINT_ANGLES: f32 = 2.15;
 
-/// Edges at a point that are at least this long, in metres, show that it is more than a spike of the mesh.
+/// Least length in metres of the edges at a point: shorter ones are a spike of the mesh.
 const POINT_DEPTH: f32 = 0.003;
 
-/// Edge of the cells into which space around sharp features is divided, in metres: a contact in a cell with one, or next to
-/// such a cell, touches it.
+/// Edge of the grid cells in metres: a contact in a cell with a sharp feature, or next to such a cell, touches it.
 const CELL: f32 = 0.002;
 
 /// Largest number of cells that are kept, against meshes that are all edges.
@@ -191,7 +190,7 @@ fn points(mesh: &TriangleMesh, edges: &[EdgeUse]) -> Vec<Vec3> {
         .collect()
 }
 
-/// Points of the surface at which a wedge is sought, and the seed by which they are drawn.
+/// Number of surface samples at which a wedge is sought, and their seed.
 const SAMPLES: u64 = 2048;
 const SEED: u64 = 0x5745_4447;
 
@@ -278,7 +277,7 @@ fn thickness_around(surface: &MeshBvh, inside: Vec3, along: Vec3) -> Option<f32>
     Some(skin(along)? + skin(-along)?)
 }
 
-/// Those of some points that form edges of some length.
+/// The points that form edges of some length.
 fn of_long_edges(points: &[Vec3]) -> Vec<Vec3> {
     let mut edges = DisjointSets::new(points.len());
     for (a, &point) in points.iter().enumerate() {

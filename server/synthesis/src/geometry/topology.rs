@@ -43,7 +43,7 @@ pub(super) struct Cap {
     count: f64,
 }
 
-/// What the containment test needs in addition to the hierarchy.
+/// Data of the containment test in addition to the hierarchy.
 #[derive(Clone, Debug)]
 pub(super) struct Containment {
     /// One for each edge of the holes' rims, in proportion to which each test takes time.
@@ -165,8 +165,7 @@ const MAX_VISITS: usize = MAX_QUERIES * 8_000;
 /// Queries that even the largest meshes get.
 const MIN_QUERIES: usize = 8;
 
-/// Minimum length of a connected part's summed area vectors, as a share of its area, for it to be a sheet. The sum is 0 for a
-/// closed surface and 1 for a flat sheet; a hemisphere, 0.5, still counts as a solid with a hole, a filled sail does not.
+/// Minimum length of a sheet's summed area vectors as a share of its area: 0 for a closed surface, 0.5 for a hemisphere.
 const MIN_SHEET_FLATNESS: f64 = 0.6;
 
 /// Counts of a mesh's parts and of its irregular edges. Vertices at equal positions count as one, so that texture
@@ -241,7 +240,7 @@ fn sheets(mesh: &TriangleMesh, stop: Stop<'_>, winding: impl Fn(Vec3) -> f64) ->
     if flat.is_empty() {
         return Ok(Vec::new());
     }
-    // Of very many parts, such as the leaves of a plant, the largest decide for the others.
+    // The largest parts decide for all, since a plant may have thousands of leaves.
     flat.sort_by(|&a, &b| sums[b].1.total_cmp(&sums[a].1));
     let most = MAX_QUERIES.min((MAX_VISITS / triangles).max(MIN_QUERIES));
     let queries = (most / flat.len()).max(1);
@@ -339,8 +338,7 @@ fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
         .collect()
 }
 
-/// True if triangles use every edge equally often in both directions: edge hashes, added in one direction and
-/// subtracted in the other, then cancel. An open mesh passes by accident with a probability of 2^-64.
+/// True if triangles use every edge equally often in both directions, by a sum of signed edge hashes.
 fn is_closed_by_index(triangles: &[[u32; 3]]) -> bool {
     let mut sum = 0_u64;
     for &[a, b, c] in triangles {

@@ -34,18 +34,17 @@ const MAX_OVERLAP: f32 = 100.0;
 /// Overlap at which every tree is improved.
 const ORDINARY_OVERLAP: f32 = 10.0;
 
-/// Number of triangles from which that overlap is smaller, in inverse proportion, so that the time per triangle does not grow.
+/// Number of triangles above which that overlap shrinks in inverse proportion, so that the time per triangle does not grow.
 const OVERLAPPING_TRIANGLES: f32 = 3_000.0;
 
-/// Passes of reinsertion: pass n moves one of 2n + 1 nodes. The builder's usual ones, and those for meshes of more triangles than
-/// [`OVERLAPPING_TRIANGLES`]: the first and the late ones would take most of the time.
+/// Passes of reinsertion, of which pass n moves one of 2n + 1 nodes: usually, and for more than [`OVERLAPPING_TRIANGLES`].
 const REINSERTION_PASSES: Range<usize> = 0..16;
 const LARGE_MESH_PASSES: Range<usize> = 1..3;
 
 /// Cost of entering a node relative to the test of a triangle: a lower one splits leaves further, a higher one fills them.
 const NODE_COST: f32 = 2.0;
 
-/// What a child of a node refers to.
+/// The target of a node's child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Child {
     /// A node, by index.
@@ -379,10 +378,9 @@ fn reinsert(tree: &mut Bvh2, stop: Stop<'_>) -> Result<(), Stopped> {
     Ok(())
 }
 
-/// A share of its size, by which the box of a triangle is enlarged on each side. The builder merges boxes that are each other's
-/// nearest, and takes time with the square of their number if all are alike, such as those of a fan of slivers.
+/// Relative enlargement of a triangle's box, different for each: the builder takes quadratic time for equal boxes.
 fn unequal(triangle: usize) -> f32 {
-    /// The fractional part of the golden ratio's multiples is spread evenly.
+    /// Fractional parts of its multiples are spread evenly.
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     /// Enough to tell boxes apart, and too little to slow queries.
     const MOST: f64 = 1e-3;

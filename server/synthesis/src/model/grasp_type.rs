@@ -21,7 +21,7 @@ pub enum GraspClass {
     Precision,
 }
 
-/// What the fingers push against.
+/// The surface that the fingers push against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Opposition {
     /// The palm.
@@ -66,7 +66,7 @@ pub enum ThumbPosition {
 pub struct Cell {
     /// How firmly the grasp holds.
     pub class: GraspClass,
-    /// What the fingers push against.
+    /// The surface that the fingers push against.
     pub opposition: Opposition,
     /// The fingers that act as one.
     pub virtual_finger: VirtualFinger,

@@ -1,4 +1,4 @@
-//! Objects, and the grips that they ban, before anything is derived from them for searching.
+//! Objects and their banned grips, without data derived for searching.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ pub const SKIN_FRICTION: f32 = 0.6;
 /// the error that a request can provoke.
 pub const MAX_NAMED_TRIANGLES: usize = 10;
 
-/// An object as it is kept: what was given of it, and its box. Clones share the mesh.
+/// An object as stored: the given properties and its box. Clones share the mesh.
 #[derive(Clone, Debug)]
 pub struct PlainObject {
     /// Its surface.
@@ -44,7 +44,7 @@ pub struct PlainObject {
     forbidden: Arc<[bool]>,
     /// Which parts hands should take or leave.
     regions: Arc<Regions>,
-    /// The grips with which it is not to be taken.
+    /// The banned grips.
     banned: Arc<[BannedGrip]>,
 }
 
@@ -213,7 +213,7 @@ impl PlainObject {
         &self.regions
     }
 
-    /// The grips with which it is not to be taken.
+    /// The banned grips.
     pub(super) fn banned(&self) -> &[BannedGrip] {
         &self.banned
     }

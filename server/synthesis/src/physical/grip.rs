@@ -38,8 +38,8 @@ use crate::{
 /// under a firm grip. Larger values let hands look sunken.
 pub const MAX_PENETRATION: f32 = 0.002;
 
-/// Clearance between the receiving hand and forearm and other hands, in metres; how much closer obstacles may be is up to
-/// [`Barriers`]. Larger values are safer and find fewer grasps.
+/// Clearance between the receiving hand and forearm and other hands, in metres; [`Barriers`] lets obstacles be closer. Larger
+/// values are safer and find fewer grasps.
 pub const GIVER_CLEARANCE: f32 = 0.001;
 
 /// Clearance between the hand and forbidden surfaces, in metres: flesh may yield by two millimetres, and skin is one
@@ -76,10 +76,9 @@ pub struct Gripper {
     pub posed: Vec<DigitAngles>,
     /// Contacts of the hand.
     pub contacts: Vec<Contact>,
-    /// Whether another hand's contacts complete its own: closure is left to [`super::both_hands`], and its grips have an
-    /// epsilon of 0.
+    /// Whether another hand holds, too: closure is left to [`super::both_hands`], and epsilon is 0.
     is_shared: bool,
-    /// Whether what an idle digit rests on counts as contact.
+    /// Whether the touch of an idle digit at rest counts as contact.
     counts_resting: bool,
     obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
@@ -99,8 +98,8 @@ impl Gripper {
         }
     }
 
-    /// Closes hands that are answers. Where an idle digit has no room and rests on the object, it holds it; the grips that
-    /// atlases grow leave such digits out of account.
+    /// Closes hands for answers. An idle digit that has no room and rests on the object holds it; grips in atlases ignore such
+    /// digits.
     pub fn answering() -> Self {
         Self {
             counts_resting: true,
@@ -195,7 +194,7 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
-        // One without room may rest on the object, and holds it then.
+        // An idle finger without room rests on the object, and then holds it.
         let resting = if self.counts_resting {
             closer.touching(&digits)
         } else {
@@ -279,7 +278,7 @@ impl Gripper {
         if !shape.is_hook() {
             return self.opposed_closure(scene);
         }
-        // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
+        // Fingers that should hook but hold nothing point past the handle; one such finger looks natural.
         let closing = (1..5).filter(|&finger| shape.closing[finger]);
         let touching = closing.clone().filter(|&finger| closed[finger].touches_object());
         let enough_touch = touching.count() >= closing.count().min(3);

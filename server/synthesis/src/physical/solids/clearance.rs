@@ -24,8 +24,8 @@ pub const SOFT_CONTACT: f32 = 0.002;
 /// are compared: a knuckle's radius includes flesh of the palm that neighbours share.
 const KNUCKLE_TAPER: f32 = 1.03;
 
-/// The smallest distance in metres between parts of a rig's hand that can meet, plus what soft flesh allows
-/// ([`SOFT_CONTACT`]) and what they overlap at rest: negative if one goes through another, [`SOFT_CONTACT`] if none touch.
+/// The smallest distance in metres between parts of a rig's hand that can meet, plus [`SOFT_CONTACT`], which soft flesh allows,
+/// and their overlap at rest: negative if a part goes through another, [`SOFT_CONTACT`] if none touch.
 ///
 /// The parts that can meet are the links of different digits, the two outer links of a digit and the palm, and, for
 /// fingers, the ball of the thumb. Inner links and the thumb's ball overlap the palm in every pose.
@@ -42,7 +42,7 @@ pub fn self_clearance(rig: &Rig, hand: &HandSolids) -> f32 {
 /// The two parts of a hand that can meet and come closest.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NearestParts {
-    /// [`self_clearance`] of them, however far apart they are.
+    /// [`self_clearance`] of them, at any distance.
     pub clearance: f32,
     /// How deep they overlap at rest, in metres.
     pub rest_overlap: f32,
@@ -70,7 +70,7 @@ impl NearestParts {
     }
 }
 
-/// How deep the parts of a rig's hand overlap in some poses, each pair as deep as where it is deepest; `None` if none do.
+/// The largest overlap of each pair of a rig's parts in some poses; `None` if no parts overlap.
 pub fn rest_overlaps(rig: &Rig, poses: &[HandPose]) -> Option<Box<RestOverlaps>> {
     let mut overlaps = RestOverlaps::default();
     for pose in poses {
@@ -143,7 +143,7 @@ impl Parts {
         }
     }
 
-    /// The smallest distance between parts that can meet, plus what they overlap at rest, or `enough` if it is larger. Each pair
+    /// The smallest distance between parts that can meet, plus their overlap at rest, or `enough` if it is larger. Each pair
     /// that is closer than all before it is passed to `nearer`.
     #[inline]
     fn least_distance(
@@ -194,8 +194,7 @@ impl Bounded {
         by_spheres.max(by_axis)
     }
 
-    /// True if the other is certainly farther away than `distance`: by the bounding spheres, then by one sphere and
-    /// the longer solid's axis, because the sphere around a forearm is wide.
+    /// True if the other is certainly farther away than `distance`, by the bounding spheres and the longer solid's axis.
     pub(in crate::physical) fn is_beyond(&self, other: &Self, distance: f32) -> bool {
         let reach = distance + self.radius + other.radius;
         if reach < 0.0 || self.centre.distance_squared(other.centre) > reach * reach {

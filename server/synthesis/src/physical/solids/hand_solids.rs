@@ -213,8 +213,7 @@ pub const TRACKED_SOLIDS: usize = AROUND_METACARPALS + 1;
 pub struct TrackedSolids {
     /// The hand as it is compared with an object.
     pub hand: HandSolids,
-    /// Its palm, along the metacarpals at least as thick as tracked. Four separate solids instead would no longer fit
-    /// into the same number of registers.
+    /// Its palm, along the metacarpals at least as thick as tracked.
     pub palm: [TaperedCapsule; PALM_SOLIDS],
     /// The other tracked parts: across the knuckles, from the wrist to all metacarpal bases, and the middle of the
     /// forearm.

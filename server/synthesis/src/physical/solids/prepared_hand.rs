@@ -60,7 +60,7 @@ impl PreparedHand {
         Self::of(&COLLISION_ORDER.map(|solid| Bounded::new(all[solid])))
     }
 
-    /// What is certainly inside a mesh: distances from it are upper bounds of those from the mesh.
+    /// Prepares balls inside a mesh: distances from them are upper bounds of those from the mesh.
     pub(crate) fn inside(mesh: &HandMesh) -> Self {
         // Without volume, a point of the surface.
         let point = mesh.surface.mesh().corners(0)[0];
