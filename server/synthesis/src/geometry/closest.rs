@@ -126,8 +126,7 @@ pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
     Vec4::select(inside, height * height, edges)
 }
 
-/// Squared distances from points to edges. `from_start` is the point relative to the edge's start, `along` its dot
-/// product with the edge.
+/// Squared distances from points to edges. `along` is the dot product of `from_start` and the edge.
 #[inline]
 fn edge_distance(from_start: &[Vec4; 3], edge: &[Vec4; 3], along: Vec4, squared_length: Vec4) -> Vec4 {
     let t = (along / squared_length).max(Vec4::ZERO).min(Vec4::ONE);

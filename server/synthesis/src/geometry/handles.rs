@@ -46,8 +46,7 @@ const ESTIMATED_FROM: usize = 12;
 const RAYS: usize = 32;
 pub(crate) const RAY_LENGTH: f32 = 0.045;
 
-/// Largest mean square of the normals' components along a part, and smallest across its narrower side: 0 and 0.5 for a rod, 0
-/// and 0 for a plate.
+/// Largest mean square of the normals' components along a part, and smallest across its narrower side: 0 and 0.5 for a rod.
 const MAX_ALONG: f64 = 0.08;
 const MIN_ACROSS: f64 = 0.12;
 
@@ -69,8 +68,7 @@ const FINGER_RADIUS: f32 = 0.008;
 const PALM_RADIUS: f32 = 0.016;
 const GAP: f32 = 0.002;
 
-/// Cosine of the angle between the axes of two places of the same straight part, and by how much more the part may be off its
-/// axis per metre: grips are slightly bent.
+/// Cosine of the angle between the axes of two places of a straight part, and its extra offset from the axis per metre.
 const PARALLEL: f32 = 0.9;
 const BOW: f32 = 0.15;
 
@@ -182,7 +180,7 @@ impl Handles {
     }
 }
 
-/// How many places can be probed in bounded time: all, unless thousands of triangles overlap along every ray.
+/// Number of places that can be probed in bounded time: all, unless thousands of triangles overlap along every ray.
 fn affordable(surface: &MeshBvh, middles: &[Vec3]) -> usize {
     let step = middles.len().div_ceil(ESTIMATED_FROM).max(1);
     let rays = middles.iter().step_by(step).zip(Vec3::AXES.into_iter().cycle());

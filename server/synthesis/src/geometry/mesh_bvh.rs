@@ -109,8 +109,8 @@ impl MeshBvh {
         })
     }
 
-    /// True if each query takes about as long as looking at all triangles: if so many overlap, such as thousands of needles through
-    /// one place, or if holes have so many edges. Of a quick hierarchy, only the holes count.
+    /// True if queries take about as long as a scan of all triangles, because thousands overlap in one place or holes have
+    /// thousands of edges. A quick hierarchy is judged by its holes alone.
     pub fn is_crowded(&self) -> bool {
         let field = self.distance_field.as_ref();
         let overlaps = field.is_some_and(|field| field.is_cut_short);
@@ -122,7 +122,7 @@ impl MeshBvh {
         self.containment.caps.len()
     }
 
-    /// How many packs of up to four triangles a search along a segment has to look at, at most.
+    /// Upper bound of the packs of up to four triangles that a search along a segment visits.
     pub(crate) fn packs_along(&self, segment: Segment) -> usize {
         if self.aabb.may_intersect(segment) {
             crossing::packs_along(&self.bvh, segment)
@@ -231,7 +231,7 @@ struct DistanceField {
     /// The box around the surface, which gives the better bound beyond the grid.
     aabb: Aabb,
     distances: Vec<f32>,
-    /// Whether some of the distances are only lower bounds, because finding them would have taken too long.
+    /// Whether some of the distances are only lower bounds, because the budget was spent.
     is_cut_short: bool,
 }
 

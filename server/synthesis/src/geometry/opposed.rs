@@ -1,4 +1,4 @@
-//! How far apart the places of a surface are that can be pressed against each other.
+//! Distance between the closest places of a surface that can be pressed against each other.
 
 use std::f32::consts::PI;
 

@@ -20,8 +20,7 @@ use crate::base::{
     stop::{Stop, Stopped},
 };
 
-/// Cosine of the angle between the outward normals of two faces beyond which the edge between them is sharp: the faces enclose
-/// less than 30°.
+/// Cosine of the angle between outward normals below which an edge is sharp: the faces enclose less than 30°.
 const SHARP_COS: f32 = -0.866;
 
 /// Least length of an edge in metres: shorter ones are flaws of a mesh.
@@ -129,7 +128,7 @@ impl SharpFeatures {
     }
 }
 
-/// The cells on features so far: features that pass through the same place, such as thousands of needles, mark it once.
+/// The cells on features so far: overlapping features mark a cell once.
 #[derive(Default)]
 struct Marked {
     cells: HashSet<IVec3>,
@@ -194,7 +193,7 @@ fn points(mesh: &TriangleMesh, edges: &[EdgeUse]) -> Vec<Vec3> {
 const SAMPLES: u64 = 2048;
 const SEED: u64 = 0x5745_4447;
 
-/// Thickness in metres up to which a part is probed, and that of its end up to which it cuts.
+/// Largest thickness in metres of a probed part, and of an end that cuts.
 const THIN: f32 = 0.003;
 const BLUNT: f32 = 0.0015;
 
@@ -204,7 +203,7 @@ const ANGLES: [f32; 2] = [0.087, 0.524];
 /// Distance from a point to the end of its wedge, in metres: nearer ones may be on the end's rounding.
 const TO_END: [f32; 2] = [0.001, 0.008];
 
-/// How far behind a point the wedge has to be thicker, in metres, as if its faces met at no less than the smallest angle.
+/// Distance in metres behind a point at which the wedge must be thicker, by the smallest angle or more.
 const BEHIND: f32 = 0.003;
 
 /// Largest distance in metres between neighbouring points of the same edge.
@@ -267,8 +266,7 @@ fn section(surface: &MeshBvh, normal: Vec3, position: Vec3) -> Option<Section> {
     })
 }
 
-/// Thickness along a direction, in metres, of the part around a point inside it; `None` if it is more than twice as thick as a
-/// blade.
+/// Thickness of the part around a point inside it, in metres; `None` beyond twice that of a blade.
 fn thickness_around(surface: &MeshBvh, inside: Vec3, along: Vec3) -> Option<f32> {
     let skin = |along: Vec3| {
         let hit = surface.first_hit(Segment::new(inside, inside + along * 2.0 * THIN))?;

@@ -57,7 +57,7 @@ impl<'a> SurfaceSampler<'a> {
     }
 }
 
-/// Samples from which the cost of all is estimated.
+/// Samples that estimate the cost of all.
 const PROBES: u64 = 32;
 
 /// Budget of triangle packs that all rays from a set of samples may visit.
@@ -66,8 +66,8 @@ const MAX_PACKS: usize = 1 << 19;
 /// Budget of hole edges that the containment tests at all those rays' ends may visit.
 const MAX_RIM_EDGES: usize = 1 << 21;
 
-/// Of how many samples one is to be used if a ray starts at each and goes into the surface for a length in metres: 1, unless
-/// thousands of triangles overlap along every ray or holes have thousands of edges.
+/// Stride through samples that each cast a ray into the surface, for a length in metres: 1, unless thousands of triangles
+/// overlap along every ray or holes have thousands of edges.
 pub(crate) fn ray_stride(
     surface: &MeshBvh,
     sampler: &SurfaceSampler<'_>,

@@ -22,12 +22,10 @@ use super::{
 };
 use crate::base::stop::{Stop, Stopped};
 
-/// Points whose winding number exceeds this in magnitude are inside: halfway between not enclosed and enclosed once.
-/// The magnitude makes a mesh that is inside out as a whole enclose its volume too.
+/// Points whose winding number exceeds this in magnitude, which ignores the mesh's orientation, are inside.
 const INSIDE: f64 = 0.5;
 
-/// Directions of the rays, in order of preference: unit vectors away from axes, diagonals and each other, along which
-/// modelled surfaces tend to run. If a ray grazes an edge, the next direction is tried.
+/// Directions of the rays, tried in turn until no edge is grazed: away from axes and diagonals, which modelled edges follow.
 const DIRECTIONS: [Vec3; 4] = [
     Vec3::new(0.858_314_5, 0.393_482_4, 0.329_470_7),
     Vec3::new(-0.314_159_3, 0.876_129_6, -0.365_632_5),
@@ -143,8 +141,7 @@ fn winding_number(mesh: &TriangleMesh, point: Vec3, counts: impl Fn(usize) -> bo
         .sum()
 }
 
-/// The signed solid angle of a triangle seen from a point, as a share of the full sphere; positive if the point sees
-/// the back of the triangle (A. van Oosterom, J. Strackee: The Solid Angle of a Plane Triangle, 1983).
+/// The signed solid angle of a triangle as a share of the sphere, positive seen from the back (van Oosterom and Strackee, 1983).
 fn solid_angle_share(corners: [Vec3; 3], point: Vec3) -> f64 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - point.as_dvec3());
     let (la, lb, lc) = (DVec3::length(a), DVec3::length(b), DVec3::length(c));
@@ -156,10 +153,10 @@ fn solid_angle_share(corners: [Vec3; 3], point: Vec3) -> f64 {
 /// Largest mean [`enclosure`] of a sheet: halfway between a flat sheet and the face of a solid.
 const MAX_SHEET_ENCLOSURE: f64 = 0.75;
 
-/// Bound on the triangles that winding numbers are computed at, each in time proportional to the mesh.
+/// Bound on the queries of winding numbers, each in time proportional to the mesh.
 const MAX_QUERIES: usize = 64;
 
-/// Bound on the triangles of all those queries together, unless they are at least [`MIN_QUERIES`].
+/// Bound on the triangles that all those queries visit together, beyond [`MIN_QUERIES`].
 const MAX_VISITS: usize = MAX_QUERIES * 8_000;
 
 /// Queries that even the largest meshes get.
@@ -215,9 +212,8 @@ impl Topology {
     }
 }
 
-/// One flag per triangle: true if it belongs to a sheet, a connected part that is nearly flat and not a face of something
-/// that encloses a volume: a card without thickness, a leaf, a sail. Empty if there is none. `winding` gives the winding
-/// number of the whole mesh at a point; it is asked [`MAX_QUERIES`] times.
+/// Flags of triangles that belong to a sheet, a nearly flat connected part that is no face of a solid: a card, a leaf, a sail.
+/// Empty without sheets. `winding` gives the winding number of the whole mesh at a point.
 fn sheets(mesh: &TriangleMesh, stop: Stop<'_>, winding: impl Fn(Vec3) -> f64) -> Result<Vec<bool>, Stopped> {
     let mut parts = connected_parts(mesh, &sorted_edges(mesh));
     let triangles = mesh.triangles().len();
@@ -319,9 +315,7 @@ pub(super) struct EdgeUse {
     reversed: bool,
 }
 
-/// The boundary of a mesh as a chain of directed edges. The count of an edge is the number of triangles that traverse
-/// it in its direction minus the number that traverse it backward. A mesh with an empty boundary encloses a volume,
-/// whatever its seams and overlaps.
+/// The boundary of a mesh as directed edges, each with its uses by triangles minus those backward; empty for a closed mesh.
 fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
     // The common case, closed even without welding, is much cheaper to detect.
     if is_closed_by_index(mesh.triangles()) {

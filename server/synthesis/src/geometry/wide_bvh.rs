@@ -27,8 +27,7 @@ const PACK_FLAG: u32 = 1 << 31;
 const NO_TRIANGLE: u32 = u32::MAX;
 
 /// Largest [`overlap`] up to which reinsertion improves the tree: ordinary objects stay below 10, crumpled ones below
-/// 90. Reinsertion takes time with the square of the overlap: a higher bound lets hostile uploads occupy the builder
-/// for seconds to minutes, a lower one slows queries on crumpled surfaces.
+/// 90. Reinsertion takes time with the square of the overlap, which must be bounded for hostile uploads.
 const MAX_OVERLAP: f32 = 100.0;
 
 /// Overlap at which every tree is improved.
@@ -184,8 +183,7 @@ impl WideBvh {
         Ok(Self::collapse(&binary, mesh))
     }
 
-    /// Collapses a binary tree to four children per node: of the children gathered so far, the one with the largest
-    /// surface, which is most likely to be entered, is replaced by its own two until there are four.
+    /// Collapses a binary tree: in each node, the child with the largest surface is replaced by its own two until there are four.
     fn collapse(binary: &Bvh2, mesh: &TriangleMesh) -> Self {
         let mut wide = Self {
             nodes: Vec::with_capacity(binary.nodes.len() / 3 + 1),
@@ -341,8 +339,7 @@ pub(super) fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Builds the binary tree as `obvhs::bvh2::builder::build_bvh2` does, with checks between its steps. No pre-splitting: it puts
-/// a triangle into several leaves, and containment would count its crossings more than once.
+/// Builds the binary tree as `obvhs::bvh2::builder::build_bvh2` does, but without pre-splitting, which duplicates triangles.
 fn build_binary(boxes: &[BuilderAabb], is_thorough: bool, stop: Stop<'_>) -> Result<Bvh2, Stopped> {
     stop.check()?;
     let (search_distance, depth_threshold) = if is_thorough {
@@ -419,8 +416,7 @@ fn gather(binary: &Bvh2, root: u32) -> ([u32; WIDTH], usize) {
     (gathered, count)
 }
 
-/// A child still to be visited and, in the upper 32 bits, a lower bound of the distance to anything in it. Entries sort
-/// by bound without branches, because the bits of non-negative floats sort like the floats. 0 marks an empty slot.
+/// A child to visit with, in the upper 32 bits, a lower bound of its distance, by which entries sort; 0 for an empty slot.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct StackEntry(u64);
 

@@ -87,12 +87,12 @@ impl Regions {
         self.all.is_empty()
     }
 
-    /// True if some are preferred so much that contacts elsewhere are not where the owner wants them.
+    /// True if a grasp with its contacts elsewhere than on preferred regions is not natural.
     pub fn require_contacts(&self) -> bool {
         self.preferred.greatest > MAX_MISSED
     }
 
-    /// Numbers that tell regions apart that want hands at different places.
+    /// Numbers that differ for regions that prefer different places.
     pub fn numbers(&self) -> impl Iterator<Item = f32> {
         [&self.preferred, &self.avoided]
             .into_iter()
@@ -184,7 +184,7 @@ impl Marked {
         self.greatest = self.greatest.max(region.weight);
     }
 
-    /// How much a place counts, from 0 to the largest weight.
+    /// The weight of a place, from 0 to the largest weight.
     fn weight_at(&self, triangle: u32, position: Vec3) -> f32 {
         let of_triangle = self.triangles.get(triangle as usize).copied().unwrap_or_default();
         self.zones.iter().fold(of_triangle, |most, (zone, weight)| {

@@ -97,14 +97,14 @@ impl PreparedObstacle {
 }
 
 impl<'a> Barriers<'a> {
-    /// Nothing to keep clear of.
+    /// No barriers.
     pub const NONE: Barriers<'static> = Barriers {
         hands: &[],
         meshes: &[],
         obstacles: &[],
     };
 
-    /// One giver's hand and nothing else.
+    /// A giver's hand alone.
     pub const fn of_giver(giver: &'a PreparedHand) -> Self {
         Self {
             hands: std::slice::from_ref(giver),
@@ -112,7 +112,7 @@ impl<'a> Barriers<'a> {
         }
     }
 
-    /// True if there is nothing to keep clear of.
+    /// True without barriers.
     pub fn is_empty(&self) -> bool {
         self.hands.is_empty() && self.obstacles.is_empty()
     }

@@ -211,8 +211,7 @@ impl Closing<'_> {
         }
     }
 
-    /// Sweeps until the clearance of a moving link drops to `target` metres, or for `max_sweep` radians. Links must
-    /// start outside the object's volume, since only the distance to the surface is measured.
+    /// Sweeps until a moving link's clearance drops to `target` metres, or for `max_sweep` radians. Links must start outside.
     fn advance(&self, sweep: &Sweep, target: f32, max_sweep: f32) -> DigitAngles {
         let max_sweep = max_sweep.min(self.flexing.full_sweep(sweep));
         let mut swept = 0.0;
@@ -247,8 +246,7 @@ impl Closing<'_> {
         self.flexing.angles_at(sweep, swept)
     }
 
-    /// A lower bound, in metres, on the gap between a link and the surface or obstacles; exact if it is below
-    /// [`COARSE_GAP`] and `reachable`.
+    /// A lower bound, in metres, on the gap to the surface or obstacles; exact below [`COARSE_GAP`] and `reachable`.
     fn gap(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
         let obstructed = self.gap_to_obstacles(index, link, reachable);
         let lower_bound = self.surface.gap_lower_bound(link);
@@ -285,11 +283,8 @@ impl Closing<'_> {
             && links.iter().fold(INSIDE_DEPTH, smallest) >= -INSIDE_DEPTH
     }
 
-    /// Upper bounds on how fast each link's gap can shrink, in metres per radian of the rest of a sweep.
-    ///
-    /// A link is a union of spheres, which rotate in place, so only the speeds of their centres count; the fastest is
-    /// at an end of the link. A joint at its limit does not turn. As the digit bends, its parts come closer to the
-    /// joints that carry them.
+    /// Upper bounds on how fast each link's gap can shrink, in metres per radian of the rest of a sweep. A link is a union of
+    /// spheres, of which only the centres move, fastest at an end. As the digit bends, its parts approach the joints behind them.
     fn speeds(&self, sweep: &Sweep, angles: &DigitAngles, links: &[TaperedCapsule; 3]) -> [f32; 3] {
         let (pitches, max) = (angles.pitches(), self.flexing.digit.limits.max_pitches());
         let rate = |joint: usize| {

@@ -268,8 +268,7 @@ impl Gripper {
         Ok((grip, solids))
     }
 
-    /// The epsilon of the contacts, if they enclose the object or it hangs in the closed digits; 0 if another hand helps. `up` is
-    /// the unit vector against gravity; nothing hangs without.
+    /// The epsilon of the contacts if they have closure or the object hangs, which needs `up`; 0 if another hand helps.
     fn enclosure(&mut self, closer: &Closer<'_>, closed: &[ClosedDigit; 5], up: Option<Vec3>) -> Option<f32> {
         let Closer { scene, shape, .. } = closer;
         if self.is_shared {
@@ -346,8 +345,7 @@ fn opened(rig: &Rig, proposal: &Proposal) -> HandPose {
     }
 }
 
-/// The offset along the wrist's +z at which palm or thenar touch. `None` if they start inside the object or touch
-/// nothing within `max_advance` metres.
+/// The offset along the wrist's +z at which palm or thenar touch; `None` if they start inside or touch nothing.
 fn palm_advance(
     scene: &ObjectScene<'_>,
     still: &HandSolids,
@@ -395,8 +393,7 @@ fn collides_without_digits(scene: &ObjectScene<'_>, barriers: Barriers<'_>, stil
         || barriers.comes_within(still.still(), GIVER_CLEARANCE)
 }
 
-/// The deepest penetration into the object in metres. `None` if it is too deep, the hand is too close to a barrier,
-/// or parts of the hand go through each other.
+/// The deepest penetration in metres; `None` if too deep, too close to a barrier, or if the hand goes through itself.
 fn penetration(
     scene: &ObjectScene<'_>,
     rig: &Rig,

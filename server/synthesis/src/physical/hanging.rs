@@ -91,8 +91,7 @@ impl Hang {
     }
 }
 
-/// Height of the lower of the two ways out of a finger with these links, in metres, under a push to the side of
-/// [`SIDEWAYS_SHARE`]. `None` if it does not push from below.
+/// Height of a finger's lower way out, in metres, under [`SIDEWAYS_SHARE`]; `None` if it does not push from below.
 fn lip(finger: Digit, contacts: &[Contact], links: &[TaperedCapsule; 3], up: Vec3) -> Option<f32> {
     let lifting = Phalanx::ALL.into_iter().filter_map(|phalanx| {
         let part = HandPart::Phalanx(finger, phalanx);

@@ -23,8 +23,7 @@ use crate::{
 /// Range of the horizontal distance of two shoulders in a handover, in metres.
 const APART: [f32; 2] = [0.65, 1.2];
 
-/// Comfortable horizontal distance of the receiver's shoulder from the object, in metres, and its range, which follows from
-/// [`APART`].
+/// Comfortable horizontal distance of the receiver's shoulder from the object, in metres, and its range by [`APART`].
 const COMFORTABLE: f32 = 0.42;
 const NEAREST: f32 = 0.25;
 const FARTHEST: f32 = 0.55;
@@ -350,8 +349,7 @@ pub(super) fn elbows(
     })
 }
 
-/// Flexion of a wrist toward the palm and its deviation toward the little finger, in radians, by the direction to the elbow in
-/// the wrist's frame.
+/// Flexion toward the palm and deviation toward the little finger, in radians, of a wrist with the elbow in this direction.
 fn wrist_angles(handedness: Handedness, back: Vec3) -> (f32, f32) {
     (
         f32::atan2(back.z, -back.y),

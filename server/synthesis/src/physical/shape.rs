@@ -45,7 +45,7 @@ pub struct HandShape {
 }
 
 impl HandShape {
-    /// All digits close from opened, each joint alike.
+    /// All digits close from the opened pose, with bend ratios of 1.
     pub(super) const ALL_CLOSE: Self = Self {
         thumb_yaw: 0.5,
         spread: 0.5,

@@ -218,7 +218,7 @@ impl Gripper {
             return hanging.clone();
         }
         let alone = self.alone(scene, touching, presented);
-        // If neither holds, report the one that the hand is shaped for.
+        // If neither holds, report the hold that the hand is shaped for.
         hanging.filter(|_| !alone.holds()).unwrap_or(alone)
     }
 

@@ -192,8 +192,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The comfortable balance that is firm with the least friction use, starting at `least_use`; otherwise the
-    /// firmest one found.
+    /// The comfortable balance that is firm with the least friction use from `least_use` on, or else the firmest.
     fn lowest_friction_balance(&mut self, least_use: FrictionUse, solvers: &mut Solvers) -> Option<Balance> {
         let mut firmest: Option<(f64, Balance)> = None;
         for friction_use in FrictionUse::ALL {

@@ -43,7 +43,7 @@ pub(super) struct ConicLeastSquares<const FOURS: usize> {
     rows: usize,
     /// The passive set.
     columns: Vec<Column>,
-    /// As many as there are columns, in no related order.
+    /// As many as columns, in any order.
     directions: Vec<Direction<FOURS>>,
     solution: Solution<FOURS>,
 }
@@ -175,7 +175,7 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         }
     }
 
-    /// Reflects the directions so that only one contains a column, and removes it. Returns the column's share in it, and it.
+    /// Reflects the directions so that only one contains a column, and removes it. Returns the column's share and the direction.
     fn isolate_direction(&mut self, column: usize) -> Option<(f64, Direction<FOURS>)> {
         // The Householder reflection without cancellation that moves the column's whole row of T into its last entry.
         let mut normal = zeros::<FOURS>();

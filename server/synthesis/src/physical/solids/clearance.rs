@@ -20,8 +20,7 @@ use crate::{
 /// visibly overlap, smaller ones reject ordinary closed hands.
 pub const SOFT_CONTACT: f32 = 0.002;
 
-/// Upper bound on the radius of a finger's first phalanx at the knuckle over that at its far joint, where neighbours
-/// are compared: a knuckle's radius includes flesh of the palm that neighbours share.
+/// Bound on the ratio of a first phalanx's radii: the tracked radius of a knuckle includes flesh that neighbours share.
 const KNUCKLE_TAPER: f32 = 1.03;
 
 /// The smallest distance in metres between parts of a rig's hand that can meet, plus [`SOFT_CONTACT`], which soft flesh allows,
@@ -51,7 +50,7 @@ pub(crate) struct NearestParts {
 }
 
 impl NearestParts {
-    /// Of a rig's hand; `None` if no parts can meet.
+    /// The closest parts of a rig's hand; `None` if no parts can meet.
     pub(crate) fn of(rig: &Rig, hand: &HandSolids) -> Option<Self> {
         let overlap = |link, part| {
             let overlaps = rig.rest_overlaps.as_deref();
@@ -143,8 +142,7 @@ impl Parts {
         }
     }
 
-    /// The smallest distance between parts that can meet, plus their overlap at rest, or `enough` if it is larger. Each pair
-    /// that is closer than all before it is passed to `nearer`.
+    /// The smallest distance between parts that can meet plus overlap at rest, up to `enough`; `nearer` receives each closer pair.
     #[inline]
     fn least_distance(
         &self,
@@ -264,9 +262,7 @@ pub fn closest(capsule: &TaperedCapsule, surface: &MeshBvh, within: f32) -> Opti
     nearest
 }
 
-/// Finds the deepest point of the axis in the volume by branch and bound on an interval of it: depth changes by no
-/// more than the distance along the axis, the radius by its slope. The surface is within `reach` metres of the
-/// interval's middle.
+/// Finds the deepest point of an axis interval by branch and bound; the surface is within `reach` metres of its middle.
 fn deepen(
     capsule: &TaperedCapsule,
     surface: &MeshBvh,
