@@ -4,10 +4,8 @@
 //! object's frame, so the object's search structures are built once.
 //!
 //! Conventions: right-handed, metres, kilograms, newtons, radians, unit quaternions; `a_from_b` maps points of frame
-//! b
-//! to frame a. Hand frames follow the thesis (4.4): +y along the fingers, +z out of the palm, pitch about x, yaw
-//! about
-//! z; only [`model::hand::joints`] converts between them and `OpenXR` joint frames.
+//! b to frame a. Hand frames follow the thesis (4.4): +y along the fingers, +z out of the palm, pitch about x, yaw
+//! about z; only [`model::hand::joints`] converts between them and `OpenXR` joint frames.
 //!
 //! The modules are layers. Each imports only from layers above it in this table; `tests/run` checks that.
 //!

@@ -170,10 +170,10 @@ fn growth(criterion: &mut Criterion) {
 /// Searches of each holdout.
 const SEARCHES: u64 = 2;
 
-/// Every how many grips of an atlas one is a current grasp.
+/// Stride through the grips of an atlas to select current grasps.
 const EVERY: usize = 17;
 
-/// Nothing here waits for a time.
+/// A clock that is always at zero: no search here has a deadline.
 struct NoTime;
 
 impl Clock for NoTime {
@@ -239,7 +239,7 @@ impl Case {
         case
     }
 
-    /// With the giver where the hand is.
+    /// With the giver's hand near the receiving one.
     fn with_giver(&self) -> Self {
         let giver = self.holdout.presenting_hand.as_ref();
         let joints = giver.and_then(|giver| giver.shape.joints());
@@ -252,7 +252,7 @@ impl Case {
     }
 }
 
-/// A hand that attempts find, which the atlas lacks.
+/// A hand found by attempts, which the atlas lacks.
 fn found(holdout: &Holdout, object: &PreparedObject, seed: u64) -> Option<HandPose> {
     let settings = SearchSettings {
         run: Run {
@@ -280,7 +280,7 @@ fn found(holdout: &Holdout, object: &PreparedObject, seed: u64) -> Option<HandPo
     outcome.grasp.map(|grasp| grasp.pose)
 }
 
-/// Decisions about a current grasp, by what becomes of it.
+/// Decisions about a current grasp, by outcome.
 fn current(criterion: &mut Criterion) {
     let (mut attempted, mut known) = (Vec::new(), Vec::new());
     for built_in in holdouts::holdouts() {

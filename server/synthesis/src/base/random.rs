@@ -104,8 +104,7 @@ impl AttemptStream {
     }
 }
 
-/// The finaliser of `SplitMix64` (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014): a bijection
-/// in which every input bit moves about half of the output bits.
+/// The finaliser of `SplitMix64` (Steele, Lea, Flood, OOPSLA 2014), a bijection.
 fn mix(value: u64) -> u64 {
     let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

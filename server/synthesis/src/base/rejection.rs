@@ -30,8 +30,7 @@ pub enum Rejection {
 }
 
 impl Rejection {
-    /// All kinds: those of Table 5.2 in its order, which is also the order of an attempt's checks, then the one that the thesis
-    /// lacks.
+    /// All kinds: those of Table 5.2 in its order, which is also the order of an attempt's checks, then `UnmetRequirement`.
     pub const ALL: [Self; 9] = [
         Self::NoContacts,
         Self::NoThumb,

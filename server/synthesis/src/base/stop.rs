@@ -1,11 +1,11 @@
-//! Ends long work early when nobody waits for it any more.
+//! Ends long work early when nobody waits for its result.
 
 /// Work was stopped before its end; there is no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the work was stopped")]
 pub struct Stopped;
 
-/// Says whether work should go on. Long loops ask at least every few milliseconds.
+/// Stop signal of a computation. Long loops poll it at least every few milliseconds.
 #[derive(Clone, Copy)]
 pub struct Stop<'a>(Option<&'a (dyn Fn() -> bool + Sync)>);
 
@@ -42,7 +42,7 @@ impl<'a> Stop<'a> {
         self.check().is_err()
     }
 
-    /// As [`Self::check`], for one of `period` steps of a loop, so that short steps do not ask each time.
+    /// As [`Self::check`], but polls only once in `period` steps of a loop.
     ///
     /// # Errors
     /// [`Stopped`].

@@ -77,7 +77,7 @@ impl Aabb {
     }
 }
 
-/// Number of directions whose outermost vertices the box is fitted to, about 7° apart.
+/// Number of directions whose outermost vertices the box is fitted to: about 7° apart.
 const SUPPORT_DIRECTIONS: usize = 256;
 
 /// Number of initial orientations in addition to the object's axes and its principal axes, against local minima.
@@ -86,8 +86,7 @@ const EXTRA_ORIENTATIONS: usize = 10;
 /// Upper bound of turns from one initial orientation. Most fits end after ten.
 const MAX_TURNS: usize = 100;
 
-/// Thickness added to the box when sizes are compared, as a share of the diagonal: among the boxes of a flat object,
-/// which have no volume, the one with the smallest face then wins.
+/// Thickness added in comparisons of volume, as a share of the diagonal, so that flat boxes compare by area.
 const COMPARED_THICKNESS: f64 = 1e-4;
 
 /// A tight box around an object: B of thesis 4.3.
@@ -109,7 +108,7 @@ impl OrientedBox {
         unstopped(|stop| Self::around_until(mesh, stop))
     }
 
-    /// The box of what it encloses, `scale` times as large about the origin of the object's frame.
+    /// The box scaled about the origin of the object's frame.
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
         let Pose {
@@ -261,9 +260,7 @@ fn refine(points: &[DVec3], initial: DMat3, size: impl Fn(DMat3) -> f64) -> DMat
     axes
 }
 
-/// The axes turned about the `fixed` one to the smallest rectangle around the points as seen along it. That rectangle
-/// has a side on an edge of the convex hull (H. Freeman, R. Shapira: Determining the Minimum-Area Encasing Rectangle
-/// for an Arbitrary Closed Curve, 1975).
+/// The axes turned about the `fixed` one to the minimum-area rectangle, by rotating calipers (Freeman and Shapira, 1975).
 fn turn_about(points: &[DVec3], axes: DMat3, fixed: usize) -> DMat3 {
     let (x, y) = (axes.col((fixed + 1) % 3), axes.col((fixed + 2) % 3));
     let hull = convex_hull(points.iter().map(|p| DVec2::new(p.dot(x), p.dot(y))).collect());
@@ -292,8 +289,7 @@ fn turn_about(points: &[DVec3], axes: DMat3, fixed: usize) -> DMat3 {
     DMat3::from_cols(columns[0], columns[1], columns[2])
 }
 
-/// The convex hull of points in the plane, counter-clockwise (A. M. Andrew: Another efficient algorithm for convex
-/// hulls in two dimensions, 1979).
+/// The convex hull of points in the plane, counter-clockwise, by Andrew's monotone chain (1979).
 fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();

@@ -14,11 +14,10 @@ use super::{
     wide_bvh::{Node, TrianglePack, WideBvh},
 };
 
-/// Slack of the lower bounds, in metres: exceeds all rounding for coordinates up to a metre, and is a hundredth of
-/// what matters to a hand.
+/// Slack of the lower bounds, in metres: exceeds all rounding for coordinates up to a metre.
 const SLACK: f32 = 1e-6;
 
-/// How much closer a triangle must be to replace the one found so far, in metres: the accuracy of the result.
+/// How much closer a triangle must be to replace the closest so far, in metres: the accuracy of the result.
 const ACCURACY: f32 = 1e-5;
 
 /// Floor of determinants of two directions before division, in m⁴: positive, and below that of two perpendicular micrometres.
@@ -111,8 +110,7 @@ pub(super) fn is_within(bvh: &WideBvh, capsule: &TaperedCapsule, distance: f32) 
     is_within
 }
 
-/// Visits triangles with gaps below a limit, roughly closest first. `found` receives each gap and its triangle and
-/// returns the new limit.
+/// Visits triangles with gaps below a limit, roughly closest first. `found` returns the new limit.
 #[inline]
 fn descend(bvh: &WideBvh, query: &Query, limit: f32, found: impl FnMut(f32, u32) -> f32) {
     bvh.visit_nearest(
@@ -200,12 +198,8 @@ fn box_gaps(node: &Node, query: &Query) -> Vec4 {
     Vec4::select(used, bound - SLACK, Vec4::NAN)
 }
 
-/// Gaps to the triangles of a pack; NaN for unused lanes.
-///
-/// The minimum lies at an end of the axis, at a corner, at an edge's stationary point (where the line from axis to
-/// edge is perpendicular to the edge and meets the axis at the cone's angle), or where the axis crosses the triangle;
-/// over the interior of the face, the distance is linear. Every candidate is a distance that occurs, so their minimum
-/// is correct.
+/// Gaps to the triangles of a pack; NaN for unused lanes. The minimum lies at an end of the axis, at a corner, at an edge's
+/// stationary point, or where the axis crosses the triangle; over the interior of the face, the distance is linear.
 #[inline]
 fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
     let first = minus(&query.start, &pack.corner);

@@ -28,7 +28,7 @@ pub(super) fn is_beyond(aabb: &Aabb, point: Vec3, max_distance: f32) -> bool {
 pub(super) struct GivenUp;
 
 /// The triangle closest to a point, the closest point on it and its distance; `None` beyond `max_distance` metres. Gives up once
-/// `may_go_on` returns false, which is called for each node and each pack of triangles.
+/// `may_go_on`, called for each node and each pack of triangles, returns false.
 // Not inlined: far points return early and must not pay for the stack.
 #[inline(never)]
 pub(super) fn closest(
@@ -93,10 +93,7 @@ fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
     dot(&outside, &outside) * BOX_SLACK
 }
 
-/// Squared distances to the triangles of a pack; NaN for unused lanes.
-///
-/// Without branches: the distance to the plane if the point projects into the triangle, else the smallest distance to
-/// its three edges.
+/// Squared distances to the triangles of a pack, without branches; NaN for unused lanes.
 #[inline]
 pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
     let c = minus(point, &pack.corner);
@@ -129,8 +126,7 @@ pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
     Vec4::select(inside, height * height, edges)
 }
 
-/// Squared distances from points to edges. `from_start` is the point relative to the edge's start, `along` its dot
-/// product with the edge.
+/// Squared distances from points to edges. `along` is the dot product of `from_start` and the edge.
 #[inline]
 fn edge_distance(from_start: &[Vec4; 3], edge: &[Vec4; 3], along: Vec4, squared_length: Vec4) -> Vec4 {
     let t = (along / squared_length).max(Vec4::ZERO).min(Vec4::ONE);

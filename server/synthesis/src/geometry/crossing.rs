@@ -15,15 +15,13 @@ use super::{
     wide_bvh::{Node, TrianglePack, WideBvh, lanes},
 };
 
-/// Bound of the `f32` stage's rounding error, relative to the product of the lengths involved: about 20 operations of
-/// half an epsilon each. Larger is safe and sends more triangles to the `f64` stage; smaller may lose crossings.
+/// Bound of the `f32` stage's rounding error, relative to the product of the lengths: about 20 operations of half an epsilon.
 const ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 /// Relative slack of the interval in which a segment is inside a box: three roundings each of two plane distances.
 const SLAB_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
 
-/// Replaces zero components of the direction, in metres, to keep their inverse finite: far below the spacing of
-/// coordinates, and its inverse times any coordinate does not overflow.
+/// Replaces zero components of the direction, in metres, to keep their inverse finite.
 const TINY_COMPONENT: f32 = 1e-18;
 
 /// A segment prepared for the inner loops: start + t·direction for t from 0 to 1.

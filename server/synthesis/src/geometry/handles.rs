@@ -1,8 +1,7 @@
 //! Handles: slender parts with room around them, found from the mesh alone.
 //!
-//! A part is a handle where the surface around a point inside it faces all ways but two: along those it goes on for the
-//! breadth of a hand. Spheres of a finger's and of a palm's thickness find the room around it. So grips, stems, necks and
-//! bows are all found alike, whatever the rest of the object looks like.
+//! A part is a handle where the surface around a point inside it faces in all directions across an axis, but not along it, for
+//! the breadth of a hand. Spheres as thick as a finger and a palm probe the room around it.
 
 use std::f32::consts::TAU;
 
@@ -18,7 +17,7 @@ use crate::base::{
     stop::{Stop, Stopped},
 };
 
-/// Points of the surface below which a part is sought, and the seed by which they are drawn.
+/// Number of surface samples below which a part is sought, and their seed.
 const SAMPLES: u64 = 1024;
 const SEED: u64 = 0x4841_4e44;
 
@@ -28,19 +27,17 @@ const START_DEPTH: f32 = 1e-5;
 /// Minimum cosine between a ray through a part and the normals at its ends: 45°.
 const MIN_COS: f32 = 0.7;
 
-/// Thickness in metres of what fingers can wrap: thinner parts are pinched, thicker ones are not enclosed.
+/// Thickness in metres of parts that fingers can wrap: thinner ones are pinched, thicker ones are not enclosed.
 const THICKNESS: [f32; 2] = [0.008, 0.06];
 
 /// Largest number of points that are probed, evenly spread over the surface. Each takes about 10 µs.
 const MAX_PROBED: usize = 128;
 
-/// Tests for containment per probe, at most, and edges of holes that all of them together may have to look at: probes of a surface
-/// with thousands of such edges are fewer.
+/// Most containment tests per probe, and the budget of hole edges that all of them together may visit.
 const TESTS_PER_PROBE: usize = 2 + 2 * DIRECTIONS;
 const MAX_RIM_EDGES: usize = 1 << 21;
 
-/// Rays and tests of a probe, packs of triangles that all of them together may have to look at, and probes from which that is
-/// estimated.
+/// Rays and tests of a probe, the budget of triangle packs that all of them may visit, and the probes that estimate that cost.
 const QUERIES_PER_PROBE: usize = RAYS + TESTS_PER_PROBE + QUERIES;
 const MAX_PACKS: usize = 1 << 20;
 const ESTIMATED_FROM: usize = 12;
@@ -49,22 +46,21 @@ const ESTIMATED_FROM: usize = 12;
 const RAYS: usize = 32;
 pub(crate) const RAY_LENGTH: f32 = 0.045;
 
-/// Largest mean square of the normals' components along a part, and smallest across its narrower side: 0 and 0.5 for a rod, 0
-/// and 0 for a plate.
+/// Largest mean square of the normals' components along a part, and smallest across its narrower side: 0 and 0.5 for a rod.
 const MAX_ALONG: f64 = 0.08;
 const MIN_ACROSS: f64 = 0.12;
 
-/// Distance in metres from the middle at which a part has to go on to both sides: half the breadth of three fingers.
+/// Distance in metres that a part must extend to both sides of the middle: half the breadth of three fingers.
 const HALF_LENGTH: f32 = 0.027;
 
-/// By how much a bent part may be off its axis there, in metres.
+/// Largest offset of a bent part from its axis there, in metres.
 const MAX_BEND: f32 = 0.008;
 
-/// Least length in metres of a loop that is bent, and of what it has to either side of a place: two fingers in the ear of a cup.
+/// Least length in metres of a bent loop, in all and to either side of a place: two fingers in the ear of a cup.
 const MIN_BENT: f32 = 0.042;
 const MIN_ASIDE: f32 = 0.012;
 
-/// Places on loops from which they are what an object is held by: a loop is made for hands, while a spout is only as slender.
+/// Fewest places on loops for an object to be held by them: a loop is made for hands, a spout is merely slender.
 const MIN_LOOPED: usize = 4;
 
 /// Radii in metres of the spheres that probe the room around a part for fingers and for the palm, and their gap from it.
@@ -72,20 +68,18 @@ const FINGER_RADIUS: f32 = 0.008;
 const PALM_RADIUS: f32 = 0.016;
 const GAP: f32 = 0.002;
 
-/// Cosine of the angle between the axes of two places of the same straight part, and by how much more the part may be off its
-/// axis per metre: grips are slightly bent.
+/// Cosine of the angle between the axes of two places of a straight part, and its extra offset from the axis per metre.
 const PARALLEL: f32 = 0.9;
 const BOW: f32 = 0.15;
 
-/// Length of a main handle as a share of the longest one, and the length in metres from which a longer one is no more of a handle:
-/// a hammer's head is a slender part, too, but not what it is held by.
+/// Least length of a main handle as a share of the longest one's, and the length in metres beyond which more does not count.
 const MAIN_SHARE: f32 = 0.8;
 const FULL_LENGTH: f32 = 0.12;
 
 /// Directions around a part in which room is probed.
 pub(crate) const DIRECTIONS: usize = 12;
 
-/// Fewest directions side by side with room for a finger: fingers and thumb come round a part from both sides of the palm.
+/// Fewest adjacent directions with room for a finger: fingers and thumb reach around a part from both sides of the palm.
 const MIN_FREE: u32 = 10;
 
 /// Directions around a handle, as bits: turns about its axis by `TAU / DIRECTIONS`, from its first orthonormal vector.
@@ -101,15 +95,15 @@ pub struct Handle {
     pub axis: Vec3,
     /// Mean distance of its skin from the middle, in metres.
     pub radius: f32,
-    /// How far the handle goes on in a straight line through this place, in metres.
+    /// Length of the straight stretch through this place, in metres.
     pub length: f32,
-    /// How far its points are along the axis to either side, in metres.
+    /// Extent along the axis to either side, in metres.
     half_length: f32,
-    /// True if it goes on in a straight line for the breadth of three fingers.
+    /// True if it is straight for the breadth of three fingers.
     is_straight: bool,
     /// True if both ends are attached to the rest of the object, within a hand's breadth.
     pub is_looped: bool,
-    /// True if it belongs to the longest handles, or loops, which are what people hold.
+    /// True if it belongs to a main handle: one of the longest, or a loop.
     pub is_main: bool,
     /// Where the palm has room.
     pub(crate) for_palm: Sides,
@@ -186,7 +180,7 @@ impl Handles {
     }
 }
 
-/// How many places can be probed in bounded time: all, unless thousands of triangles overlap along every ray.
+/// Number of places that can be probed in bounded time: all, unless thousands of triangles overlap along every ray.
 fn affordable(surface: &MeshBvh, middles: &[Vec3]) -> usize {
     let step = middles.len().div_ceil(ESTIMATED_FROM).max(1);
     let rays = middles.iter().step_by(step).zip(Vec3::AXES.into_iter().cycle());
@@ -277,8 +271,7 @@ impl Handle {
     }
 }
 
-/// How far a point of a handle may be from its axis: so many times its mean radius, since few are round, and by so much more,
-/// in metres.
+/// Largest distance of a handle's points from its axis: a multiple of the mean radius plus a margin in metres.
 const WITHIN: f32 = 1.3;
 const SLACK: f32 = 0.004;
 
@@ -380,23 +373,22 @@ const QUERIES: usize = 2 * (MAX_STEPS * (SIDES + 1) + SIDES);
 /// Smallest cosine of the turn between two steps: 40°, as in the ear of a small cup.
 const MIN_TURN_COS: f32 = 0.77;
 
-/// How many times as thick as at its start a part may get: more is what it is attached to.
+/// Largest thickness of a part relative to its start: beyond it lies the rest of the object.
 const MAX_GROWTH: f32 = 1.7;
 
-/// Distance aside of the end of a part, in radii, at which there is nothing around a free end, and how near the rest of the object
-/// is there at an attached one. Fewest sides on which it is.
+/// Test for an attached end: distance of the probes from the end, their range, both in radii, and the fewest that hit.
 const ASIDE: f32 = 2.5;
 const NEAR: f32 = 1.5;
 const ATTACHED_SIDES: usize = 3;
 
-/// How far a part goes on to one side of a place, in metres, and whether it meets the rest of the object there.
+/// Length of a part to one side of a place, in metres, and whether it meets the rest of the object there.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     length: f32,
     is_attached: bool,
 }
 
-/// How far the part goes on in one direction, and whether it is attached there.
+/// Follows the part in one direction: its length, and whether it is attached there.
 fn walk(surface: &MeshBvh, middle: Vec3, direction: Vec3, radius: f32) -> Course {
     let (mut at, mut direction) = (middle, direction);
     let mut length = 0.0;

@@ -9,11 +9,10 @@ use super::surface_samples::SurfaceSample;
 /// Most samples in a patch. Smaller patches follow the surface better, but each look-up visits all of them.
 const PATCH_SAMPLES: usize = 16;
 
-/// Distance in metres that counts as much as a unit of difference between normals when samples are grouped: the two sides
-/// of a wall are then 4 cm apart and never share a patch.
+/// Distance in metres that counts as much as a unit of difference between normals when samples are grouped.
 const NORMAL_LENGTH: f32 = 0.02;
 
-/// Distance from the centre, as a multiple of the radius, at which a patch no longer counts.
+/// Distance from the centre, as a multiple of the radius, at which a patch's weight reaches 0.
 const FADED: f32 = 1.4;
 
 /// Height of a patch over the centre, as a share of the radius, above which it faces away from the centre.
@@ -25,11 +24,10 @@ const MIN_NORMAL_VARIANCE: f32 = 0.02;
 /// Distance in metres from a touched point at which a quarter of a patch's weight is left: the width of a fingertip.
 const TOUCHED: f32 = 0.015;
 
-/// Cosine between the normals of a touched point and of a patch up to which the patch is on another side of the object, such
-/// as the far side of a wall.
+/// Cosine between the normals of a touched point and a patch up to which the patch is on another side of the object.
 const OTHER_SIDE: f32 = 0.3;
 
-/// Squared length of a patch's mean normal over which it is no longer taken for one across an edge, such as the rim of a can.
+/// Squared lengths of a patch's mean normal up to which it spans an edge, such as the rim of a can, and from which it is smooth.
 const EDGE: [f32; 2] = [0.8, 0.9];
 
 /// Number of touched points on a patch that counts as none: that of one point about 4 cm away.

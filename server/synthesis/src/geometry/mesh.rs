@@ -154,7 +154,7 @@ impl TriangleMesh {
     }
 
     /// The centroid of the volume, in metres: the centre of mass of a homogeneous body. `None` if the mesh encloses no
-    /// volume (less than a billionth of its box's) or is so far from closed that the centroid falls outside its box.
+    /// volume (less than a billionth of its box's) or is so far from closed that the centroid is outside its box.
     pub fn volume_centroid(&self) -> Option<Vec3> {
         /// Share of the box's volume below which a volume counts as rounding error.
         const NO_VOLUME: f64 = 1e-9;

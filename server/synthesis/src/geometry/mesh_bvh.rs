@@ -17,7 +17,7 @@ use super::{
 };
 use crate::base::stop::{Stop, Stopped, unstopped};
 
-/// Edges of holes beyond which a surface is crowded: a test for containment takes half a millisecond then.
+/// Edges of holes above which a surface is crowded: a containment test then takes half a millisecond.
 const CROWDED_RIM: usize = 8192;
 
 /// Factor on the distance to one triangle, within which that triangle is found in spite of rounding.
@@ -35,7 +35,7 @@ pub struct MeshPoint {
 }
 
 /// A mesh and its hierarchy. Queries work in the mesh's frame and in metres, do not allocate for trees of usual
-/// depth, and answer "no" or "none" if a coordinate is not finite.
+/// depth, and return `false` or `None` if a coordinate is not finite.
 #[derive(Clone, Debug)]
 pub struct MeshBvh {
     mesh: Arc<TriangleMesh>,
@@ -109,8 +109,8 @@ impl MeshBvh {
         })
     }
 
-    /// True if each query takes about as long as looking at all triangles: if so many overlap, such as thousands of needles through
-    /// one place, or if holes have so many edges. Of a quick hierarchy, only the holes count.
+    /// True if queries take about as long as a scan of all triangles, because thousands overlap in one place or holes have
+    /// thousands of edges. A quick hierarchy is judged by its holes alone.
     pub fn is_crowded(&self) -> bool {
         let field = self.distance_field.as_ref();
         let overlaps = field.is_some_and(|field| field.is_cut_short);
@@ -122,7 +122,7 @@ impl MeshBvh {
         self.containment.caps.len()
     }
 
-    /// How many packs of up to four triangles a search along a segment has to look at, at most.
+    /// Upper bound of the packs of up to four triangles that a search along a segment visits.
     pub(crate) fn packs_along(&self, segment: Segment) -> usize {
         if self.aabb.may_intersect(segment) {
             crossing::packs_along(&self.bvh, segment)
@@ -152,7 +152,7 @@ impl MeshBvh {
     }
 
     /// Where the surface comes closest to a capsule's skin or penetrates it deepest, to a hundredth of a millimetre;
-    /// none if the gap exceeds `within` metres. Only the surface counts: a capsule deep inside the mesh's volume has
+    /// `None` if the gap exceeds `within` metres. Only the surface counts: a capsule deep inside the mesh's volume has
     /// a positive gap.
     pub fn closest_to_capsule(&self, capsule: &TaperedCapsule, within: f32) -> Option<CapsuleGap> {
         if self.gap_lower_bound(capsule) > within {
@@ -208,13 +208,13 @@ const MAX_NODES: f32 = 4.0 * TARGET_NODES;
 /// How far the grid extends beyond the mesh's box, in metres: about the length of a phalanx.
 const MARGIN: f32 = 0.04;
 
-/// By how much the spacing grows until the nodes are few enough.
+/// Factor by which the spacing grows until the nodes are few enough.
 const COARSER: f32 = 1.25;
 
-/// Nodes between two checks whether to stop: few, because one of a crumpled surface takes up to a millisecond.
+/// Nodes between two polls of the stop signal: few, because one of a crumpled surface takes up to a millisecond.
 const NODES_PER_CHECK: usize = 4;
 
-/// Steps of the search for the closest triangle that each node adds to what the nodes may take, and what each half begins with.
+/// Budget of search steps for closest triangles: the steps that each node adds, and those that each half starts with.
 const STEPS_PER_NODE: usize = 128;
 const SPARE_STEPS: usize = 1 << 17;
 
@@ -231,7 +231,7 @@ struct DistanceField {
     /// The box around the surface, which gives the better bound beyond the grid.
     aabb: Aabb,
     distances: Vec<f32>,
-    /// Whether some of the distances are only lower bounds, because finding them would have taken too long.
+    /// Whether some of the distances are only lower bounds, because the budget was spent.
     is_cut_short: bool,
 }
 
@@ -306,7 +306,7 @@ impl DistanceField {
                         least = within;
                     } else {
                         is_cut_short = true;
-                        // Where so much overlaps, what is known of the neighbour has to do.
+                        // The budget is spent: bound the distance by the neighbour's.
                         least = (least - self.spacing * 1.001).max(0.0);
                     }
                     within = (within + self.spacing) * 1.001;

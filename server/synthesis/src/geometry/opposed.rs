@@ -1,4 +1,4 @@
-//! How far apart the places of a surface are that can be pressed against each other.
+//! Distance between the closest places of a surface that can be pressed against each other.
 
 use std::f32::consts::PI;
 
@@ -24,13 +24,13 @@ const LEAF: usize = 4;
 /// Upper bound on the pairs of nodes compared, some tens of milliseconds of work.
 const MAX_PAIRS: usize = 400_000;
 
-/// Pairs compared between two checks whether to stop.
+/// Pairs compared between two polls of the stop signal.
 const PAIRS_PER_CHECK: usize = 64;
 
 /// A distance between opposed triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OpposedDistance {
-    /// Some are as close as required, or finding out would take too long.
+    /// Some are as close as required, or the search took too long.
     CloseOrUnknown,
     /// The closest are this far apart, in metres, within [`OPPOSED_ACCURACY`].
     Apart(f32),
@@ -225,7 +225,7 @@ impl Node {
     }
 }
 
-/// The angle between two unit vectors, in radians; π if one is zero, as then nothing is known.
+/// The angle between two unit vectors, in radians; π if one is zero.
 fn angle_between(a: Vec3, b: Vec3) -> f32 {
     if a == Vec3::ZERO || b == Vec3::ZERO {
         return PI;

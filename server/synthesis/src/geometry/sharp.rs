@@ -1,6 +1,6 @@
 //! Sharp edges and points of a mesh, which nobody touches if they can help it.
 //!
-//! Blades of scanned and of rounded models end in a face or a curve a millimetre thick. They are found by what is behind the
+//! Blades of scanned and of rounded models end in a face or a curve a millimetre thick. They are found by the wedge behind the
 //! end: two faces at a small angle, between which the part grows thicker.
 
 use std::collections::{HashMap, HashSet};
@@ -20,8 +20,7 @@ use crate::base::{
     stop::{Stop, Stopped},
 };
 
-/// Cosine of the angle between the outward normals of two faces beyond which the edge between them is sharp: the faces enclose
-/// less than 30°.
+/// Cosine of the angle between outward normals below which an edge is sharp: the faces enclose less than 30°.
 const SHARP_COS: f32 = -0.866;
 
 /// Least length of an edge in metres: shorter ones are flaws of a mesh.
@@ -30,11 +29,10 @@ const MIN_LENGTH: f32 = 0.01;
 /// Largest sum of the angles at a vertex, in radians, that makes it a point: that of a cone with half an angle of 20° at its tip.
 const POINT_ANGLES: f32 = 2.15;
 
-/// Edges at a point that are at least this long, in metres, show that it is more than a spike of the mesh.
+/// Least length in metres of the edges at a point: shorter ones are a spike of the mesh.
 const POINT_DEPTH: f32 = 0.003;
 
-/// Edge of the cells into which space around sharp features is divided, in metres: a contact in a cell with one, or next to
-/// such a cell, touches it.
+/// Edge of the grid cells in metres: a contact in a cell with a sharp feature, or next to such a cell, touches it.
 const CELL: f32 = 0.002;
 
 /// Largest number of cells that are kept, against meshes that are all edges.
@@ -130,7 +128,7 @@ impl SharpFeatures {
     }
 }
 
-/// The cells on features so far: features that pass through the same place, such as thousands of needles, mark it once.
+/// The cells on features so far: overlapping features mark a cell once.
 #[derive(Default)]
 struct Marked {
     cells: HashSet<IVec3>,
@@ -191,11 +189,11 @@ fn points(mesh: &TriangleMesh, edges: &[EdgeUse]) -> Vec<Vec3> {
         .collect()
 }
 
-/// Points of the surface at which a wedge is sought, and the seed by which they are drawn.
+/// Number of surface samples at which a wedge is sought, and their seed.
 const SAMPLES: u64 = 2048;
 const SEED: u64 = 0x5745_4447;
 
-/// Thickness in metres up to which a part is probed, and that of its end up to which it cuts.
+/// Largest thickness in metres of a probed part, and of an end that cuts.
 const THIN: f32 = 0.003;
 const BLUNT: f32 = 0.0015;
 
@@ -205,7 +203,7 @@ const ANGLES: [f32; 2] = [0.087, 0.524];
 /// Distance from a point to the end of its wedge, in metres: nearer ones may be on the end's rounding.
 const TO_END: [f32; 2] = [0.001, 0.008];
 
-/// How far behind a point the wedge has to be thicker, in metres, as if its faces met at no less than the smallest angle.
+/// Distance in metres behind a point at which the wedge must be thicker, by the smallest angle or more.
 const BEHIND: f32 = 0.003;
 
 /// Largest distance in metres between neighbouring points of the same edge.
@@ -268,8 +266,7 @@ fn section(surface: &MeshBvh, normal: Vec3, position: Vec3) -> Option<Section> {
     })
 }
 
-/// Thickness along a direction, in metres, of the part around a point inside it; `None` if it is more than twice as thick as a
-/// blade.
+/// Thickness of the part around a point inside it, in metres; `None` beyond twice that of a blade.
 fn thickness_around(surface: &MeshBvh, inside: Vec3, along: Vec3) -> Option<f32> {
     let skin = |along: Vec3| {
         let hit = surface.first_hit(Segment::new(inside, inside + along * 2.0 * THIN))?;
@@ -278,7 +275,7 @@ fn thickness_around(surface: &MeshBvh, inside: Vec3, along: Vec3) -> Option<f32>
     Some(skin(along)? + skin(-along)?)
 }
 
-/// Those of some points that form edges of some length.
+/// The points that form edges of some length.
 fn of_long_edges(points: &[Vec3]) -> Vec<Vec3> {
     let mut edges = DisjointSets::new(points.len());
     for (a, &point) in points.iter().enumerate() {

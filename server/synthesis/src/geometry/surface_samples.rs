@@ -57,17 +57,17 @@ impl<'a> SurfaceSampler<'a> {
     }
 }
 
-/// Samples from which the cost of all is estimated.
+/// Samples that estimate the cost of all.
 const PROBES: u64 = 32;
 
-/// Packs of triangles that all rays from a set of samples may have to look at.
+/// Budget of triangle packs that all rays from a set of samples may visit.
 const MAX_PACKS: usize = 1 << 19;
 
-/// Edges of holes that all those rays may have to look at, if it has to be found for each end whether it is inside.
+/// Budget of hole edges that the containment tests at all those rays' ends may visit.
 const MAX_RIM_EDGES: usize = 1 << 21;
 
-/// Of how many samples one is to be used if a ray starts at each and goes into the surface for a length in metres: 1, unless
-/// thousands of triangles overlap along every ray or holes have thousands of edges.
+/// Stride through samples that each cast a ray into the surface, for a length in metres: 1, unless thousands of triangles
+/// overlap along every ray or holes have thousands of edges.
 pub(crate) fn ray_stride(
     surface: &MeshBvh,
     sampler: &SurfaceSampler<'_>,
@@ -122,7 +122,7 @@ pub fn even_samples(mesh: &TriangleMesh) -> Vec<SurfaceSample> {
 /// Radius of the part of the surface around a sample that counts as near, in metres: the reach of a hand's contacts.
 const REACH: f32 = 0.06;
 
-/// Smallest number of samples in a part, so that a large, sparsely sampled face is not taken for a speck.
+/// Fewest samples in a part, so that a large, sparsely sampled face does not seem tiny.
 const MIN_NEIGHBOURS: usize = 16;
 
 /// The thickness of the parts of a mesh around samples of its surface, each measured when it is first needed.
@@ -160,7 +160,7 @@ impl Measured {
 }
 
 impl LocalThickness {
-    /// Of a mesh with these points, which are spread evenly over it.
+    /// The thickness of a mesh with these points, which are spread evenly over it.
     pub fn of(samples: &[SurfaceSample]) -> Self {
         let samples = samples.iter();
         Self {

@@ -22,12 +22,10 @@ use super::{
 };
 use crate::base::stop::{Stop, Stopped};
 
-/// Points whose winding number exceeds this in magnitude are inside: halfway between not enclosed and enclosed once.
-/// The magnitude makes a mesh that is inside out as a whole enclose its volume too.
+/// Points whose winding number exceeds this in magnitude, which ignores the mesh's orientation, are inside.
 const INSIDE: f64 = 0.5;
 
-/// Directions of the rays, in order of preference: unit vectors away from axes, diagonals and each other, along which
-/// modelled surfaces tend to run. If a ray grazes an edge, the next direction is tried.
+/// Directions of the rays, tried in turn until no edge is grazed: away from axes and diagonals, which modelled edges follow.
 const DIRECTIONS: [Vec3; 4] = [
     Vec3::new(0.858_314_5, 0.393_482_4, 0.329_470_7),
     Vec3::new(-0.314_159_3, 0.876_129_6, -0.365_632_5),
@@ -43,7 +41,7 @@ pub(super) struct Cap {
     count: f64,
 }
 
-/// What the containment test needs in addition to the hierarchy.
+/// Data of the containment test in addition to the hierarchy.
 #[derive(Clone, Debug)]
 pub(super) struct Containment {
     /// One for each edge of the holes' rims, in proportion to which each test takes time.
@@ -143,8 +141,7 @@ fn winding_number(mesh: &TriangleMesh, point: Vec3, counts: impl Fn(usize) -> bo
         .sum()
 }
 
-/// The signed solid angle of a triangle seen from a point, as a share of the full sphere; positive if the point sees
-/// the back of the triangle (A. van Oosterom, J. Strackee: The Solid Angle of a Plane Triangle, 1983).
+/// The signed solid angle of a triangle as a share of the sphere, positive seen from the back (van Oosterom and Strackee, 1983).
 fn solid_angle_share(corners: [Vec3; 3], point: Vec3) -> f64 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - point.as_dvec3());
     let (la, lb, lc) = (DVec3::length(a), DVec3::length(b), DVec3::length(c));
@@ -156,17 +153,16 @@ fn solid_angle_share(corners: [Vec3; 3], point: Vec3) -> f64 {
 /// Largest mean [`enclosure`] of a sheet: halfway between a flat sheet and the face of a solid.
 const MAX_SHEET_ENCLOSURE: f64 = 0.75;
 
-/// Bound on the triangles that winding numbers are computed at, each in time proportional to the mesh.
+/// Bound on the queries of winding numbers, each in time proportional to the mesh.
 const MAX_QUERIES: usize = 64;
 
-/// Bound on the triangles of all those queries together, unless they are at least [`MIN_QUERIES`].
+/// Bound on the triangles that all those queries visit together, beyond [`MIN_QUERIES`].
 const MAX_VISITS: usize = MAX_QUERIES * 8_000;
 
 /// Queries that even the largest meshes get.
 const MIN_QUERIES: usize = 8;
 
-/// Minimum length of a connected part's summed area vectors, as a share of its area, for it to be a sheet. The sum is 0 for a
-/// closed surface and 1 for a flat sheet; a hemisphere, 0.5, still counts as a solid with a hole, a filled sail does not.
+/// Minimum length of a sheet's summed area vectors as a share of its area: 0 for a closed surface, 0.5 for a hemisphere.
 const MIN_SHEET_FLATNESS: f64 = 0.6;
 
 /// Counts of a mesh's parts and of its irregular edges. Vertices at equal positions count as one, so that texture
@@ -216,9 +212,8 @@ impl Topology {
     }
 }
 
-/// One flag per triangle: true if it belongs to a sheet, a connected part that is nearly flat and not a face of something
-/// that encloses a volume: a card without thickness, a leaf, a sail. Empty if there is none. `winding` gives the winding
-/// number of the whole mesh at a point; it is asked [`MAX_QUERIES`] times.
+/// Flags of triangles that belong to a sheet, a nearly flat connected part that is no face of a solid: a card, a leaf, a sail.
+/// Empty without sheets. `winding` gives the winding number of the whole mesh at a point.
 fn sheets(mesh: &TriangleMesh, stop: Stop<'_>, winding: impl Fn(Vec3) -> f64) -> Result<Vec<bool>, Stopped> {
     let mut parts = connected_parts(mesh, &sorted_edges(mesh));
     let triangles = mesh.triangles().len();
@@ -241,7 +236,7 @@ fn sheets(mesh: &TriangleMesh, stop: Stop<'_>, winding: impl Fn(Vec3) -> f64) ->
     if flat.is_empty() {
         return Ok(Vec::new());
     }
-    // Of very many parts, such as the leaves of a plant, the largest decide for the others.
+    // The largest parts decide for all, since a plant may have thousands of leaves.
     flat.sort_by(|&a, &b| sums[b].1.total_cmp(&sums[a].1));
     let most = MAX_QUERIES.min((MAX_VISITS / triangles).max(MIN_QUERIES));
     let queries = (most / flat.len()).max(1);
@@ -320,9 +315,7 @@ pub(super) struct EdgeUse {
     reversed: bool,
 }
 
-/// The boundary of a mesh as a chain of directed edges. The count of an edge is the number of triangles that traverse
-/// it in its direction minus the number that traverse it backward. A mesh with an empty boundary encloses a volume,
-/// whatever its seams and overlaps.
+/// The boundary of a mesh as directed edges, each with its uses by triangles minus those backward; empty for a closed mesh.
 fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
     // The common case, closed even without welding, is much cheaper to detect.
     if is_closed_by_index(mesh.triangles()) {
@@ -339,8 +332,7 @@ fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
         .collect()
 }
 
-/// True if triangles use every edge equally often in both directions: edge hashes, added in one direction and
-/// subtracted in the other, then cancel. An open mesh passes by accident with a probability of 2^-64.
+/// True if triangles use every edge equally often in both directions, by a sum of signed edge hashes.
 fn is_closed_by_index(triangles: &[[u32; 3]]) -> bool {
     let mut sum = 0_u64;
     for &[a, b, c] in triangles {

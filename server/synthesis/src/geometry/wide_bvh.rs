@@ -27,25 +27,23 @@ const PACK_FLAG: u32 = 1 << 31;
 const NO_TRIANGLE: u32 = u32::MAX;
 
 /// Largest [`overlap`] up to which reinsertion improves the tree: ordinary objects stay below 10, crumpled ones below
-/// 90. Reinsertion takes time with the square of the overlap: a higher bound lets hostile uploads occupy the builder
-/// for seconds to minutes, a lower one slows queries on crumpled surfaces.
+/// 90. Reinsertion takes time with the square of the overlap, which must be bounded for hostile uploads.
 const MAX_OVERLAP: f32 = 100.0;
 
 /// Overlap at which every tree is improved.
 const ORDINARY_OVERLAP: f32 = 10.0;
 
-/// Number of triangles from which that overlap is smaller, in inverse proportion, so that the time per triangle does not grow.
+/// Number of triangles above which that overlap shrinks in inverse proportion, so that the time per triangle does not grow.
 const OVERLAPPING_TRIANGLES: f32 = 3_000.0;
 
-/// Passes of reinsertion: pass n moves one of 2n + 1 nodes. The builder's usual ones, and those for meshes of more triangles than
-/// [`OVERLAPPING_TRIANGLES`]: the first and the late ones would take most of the time.
+/// Passes of reinsertion, of which pass n moves one of 2n + 1 nodes: usually, and for more than [`OVERLAPPING_TRIANGLES`].
 const REINSERTION_PASSES: Range<usize> = 0..16;
 const LARGE_MESH_PASSES: Range<usize> = 1..3;
 
 /// Cost of entering a node relative to the test of a triangle: a lower one splits leaves further, a higher one fills them.
 const NODE_COST: f32 = 2.0;
 
-/// What a child of a node refers to.
+/// The target of a node's child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Child {
     /// A node, by index.
@@ -185,8 +183,7 @@ impl WideBvh {
         Ok(Self::collapse(&binary, mesh))
     }
 
-    /// Collapses a binary tree to four children per node: of the children gathered so far, the one with the largest
-    /// surface, which is most likely to be entered, is replaced by its own two until there are four.
+    /// Collapses a binary tree: in each node, the child with the largest surface is replaced by its own two until there are four.
     fn collapse(binary: &Bvh2, mesh: &TriangleMesh) -> Self {
         let mut wide = Self {
             nodes: Vec::with_capacity(binary.nodes.len() / 3 + 1),
@@ -342,8 +339,7 @@ pub(super) fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Builds the binary tree as `obvhs::bvh2::builder::build_bvh2` does, with checks between its steps. No pre-splitting: it puts
-/// a triangle into several leaves, and containment would count its crossings more than once.
+/// Builds the binary tree as `obvhs::bvh2::builder::build_bvh2` does, but without pre-splitting, which duplicates triangles.
 fn build_binary(boxes: &[BuilderAabb], is_thorough: bool, stop: Stop<'_>) -> Result<Bvh2, Stopped> {
     stop.check()?;
     let (search_distance, depth_threshold) = if is_thorough {
@@ -379,10 +375,9 @@ fn reinsert(tree: &mut Bvh2, stop: Stop<'_>) -> Result<(), Stopped> {
     Ok(())
 }
 
-/// A share of its size, by which the box of a triangle is enlarged on each side. The builder merges boxes that are each other's
-/// nearest, and takes time with the square of their number if all are alike, such as those of a fan of slivers.
+/// Relative enlargement of a triangle's box, different for each: the builder takes quadratic time for equal boxes.
 fn unequal(triangle: usize) -> f32 {
-    /// The fractional part of the golden ratio's multiples is spread evenly.
+    /// Fractional parts of its multiples are spread evenly.
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     /// Enough to tell boxes apart, and too little to slow queries.
     const MOST: f64 = 1e-3;
@@ -421,8 +416,7 @@ fn gather(binary: &Bvh2, root: u32) -> ([u32; WIDTH], usize) {
     (gathered, count)
 }
 
-/// A child still to be visited and, in the upper 32 bits, a lower bound of the distance to anything in it. Entries sort
-/// by bound without branches, because the bits of non-negative floats sort like the floats. 0 marks an empty slot.
+/// A child to visit with, in the upper 32 bits, a lower bound of its distance, by which entries sort; 0 for an empty slot.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct StackEntry(u64);
 

@@ -39,7 +39,7 @@ pub enum Zone {
         /// The distance in metres; more than 0.
         radius: f32,
     },
-    /// The same with a distance that changes from end to end of each segment.
+    /// The same with a distance that varies along each segment.
     TaperedTube(Vec<TaperedCapsule>),
 }
 
@@ -67,7 +67,7 @@ impl Zone {
         }
     }
 
-    /// Numbers that tell zones apart.
+    /// Numbers by which zones differ.
     pub fn numbers(&self) -> Vec<f32> {
         match self {
             Self::Ball { centre, radius } => [&centre.to_array()[..], &[*radius]].concat(),
@@ -159,8 +159,7 @@ fn is_reached(corners: [Vec3; 3], capsule: &TaperedCapsule) -> bool {
         .any(|along| value(along) <= 0.0)
 }
 
-/// True if something of a triangle is left when it is clipped by the six faces of a box around the origin (I. Sutherland and
-/// G. Hodgman, "Reentrant Polygon Clipping", 1974).
+/// True if a triangle meets a box around the origin, by Sutherland-Hodgman clipping (1974).
 fn reaches_into_box(corners: [Vec3; 3], half_extents: Vec3) -> bool {
     let mut polygon = corners.to_vec();
     for axis in 0..3 {

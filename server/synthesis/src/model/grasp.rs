@@ -37,26 +37,26 @@ pub struct Grasp {
     /// The soft-finger torsion at each contact about the surface's inward normal, in newton metres; empty under
     /// `THESIS` validity, which has none.
     pub torsions: Vec<f32>,
-    /// Angle between the total contact wrench and the one that opposes gravity (Eq. 4.5), in radians.
+    /// Angle between the total contact wrench and the wrench that opposes gravity (Eq. 4.5), in radians.
     pub wrench_angle: f32,
     /// The comfort cost E of Eq. 4.6; 0 is best.
     pub comfort: f32,
-    /// The margins of the `PHYSICAL` validity checks; none under `THESIS` validity.
+    /// The margins of the `PHYSICAL` validity checks; `None` under `THESIS` validity.
     pub margins: Option<PhysicalMargins>,
     /// The grasp type in the taxonomy.
     pub classification: Classification,
     /// True if the load hangs in hooked fingers. Closure was then not required, and the forces are those of the load at
     /// rest, with its centre of mass below the fingers.
     pub hangs: bool,
-    /// The score; none under `THESIS` validity.
+    /// The score; `None` under `THESIS` validity.
     pub score: Option<Score>,
-    /// The receiver's arm, if where the receiver stands is given or can be assumed, and the arm reaches from there.
+    /// The receiver's arm, if the receiver's place is given or can be assumed and the arm reaches from there.
     pub arm: Option<ArmPose>,
     /// The motion to the grasp, once planned ([`crate::search::key_frames`]); `None` before that, or if no straight
     /// path exists.
     pub key_frames: Option<[KeyFrame; 3]>,
-    /// The hand that holds the object together with this one, if it takes two. The forces of both balance the weight, and
-    /// residual, epsilon and wrench angle of both grasps are those of all contacts together.
+    /// The second hand of a two-handed grasp. The forces of both balance the weight, and residual, epsilon and wrench angle of
+    /// both grasps are those of all contacts together.
     pub other_hand: Option<Box<Grasp>>,
 }
 

@@ -21,7 +21,7 @@ pub enum GraspClass {
     Precision,
 }
 
-/// What the fingers push against.
+/// The surface that the fingers push against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Opposition {
     /// The palm.
@@ -66,7 +66,7 @@ pub enum ThumbPosition {
 pub struct Cell {
     /// How firmly the grasp holds.
     pub class: GraspClass,
-    /// What the fingers push against.
+    /// The surface that the fingers push against.
     pub opposition: Opposition,
     /// The fingers that act as one.
     pub virtual_finger: VirtualFinger,
@@ -246,7 +246,7 @@ pub const CLEAR_CONFIDENCE: f32 = 0.5;
 /// The result of classifying a grasp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Classification {
-    /// The type; `None` if the grasp resembles none, and a person would not call it natural.
+    /// The type; `None` for an unnatural grasp, which resembles no type.
     pub grasp_type: Option<GraspType>,
     /// The confidence, 0 to 1: the share of experts expected to name this type or one close to it, say the next size of wrap.
     /// It is the fit of the best type less half the fit of the best contradicting one, or a tenth of that of the best type

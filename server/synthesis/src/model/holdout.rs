@@ -1,4 +1,4 @@
-//! Holdouts: an object held out to the receiver, the up direction, the giver's hand, and what else is near.
+//! Holdouts: an object held out to the receiver, the up direction, the giver's hand, and other hands and obstacles.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub enum HandShape {
 pub struct PresentingHand {
     /// Its shape.
     pub shape: HandShape,
-    /// The posed skin of joints, with search structure; none under `PHYSICAL` validity, which uses the hand's solids alone.
+    /// The posed skin with search structure; `None` under `PHYSICAL` validity, which uses the hand's solids alone.
     pub skin: Option<MeshBvh>,
     /// The centre of the palm's skin, in metres.
     pub palm: Vec3,
@@ -46,11 +46,11 @@ pub struct Holdout {
     pub object: Arc<GraspObject>,
     /// The giver's hand; `None` for an object that floats freely.
     pub presenting_hand: Option<PresentingHand>,
-    /// Further hands to keep clear of. `THESIS` validity knows the presenting hand only.
+    /// Further hands to keep clear of. `THESIS` validity ignores them.
     pub other_hands: Vec<HandShape>,
-    /// Obstacles to keep clear of. `THESIS` validity knows none.
+    /// Obstacles to keep clear of. `THESIS` validity ignores them.
     pub obstacles: Vec<Obstacle>,
-    /// Where the receiver's arm may come from. `THESIS` validity does not ask.
+    /// Where the receiver's arm may come from. `THESIS` validity ignores it.
     pub stance: Stance,
     /// The direction against gravity, a unit vector.
     pub up: Vec3,
@@ -136,8 +136,8 @@ impl PresentingHand {
         })
     }
 
-    /// A hand without skin, for `PHYSICAL` validity, whose solids follow from the joints alone: a thousandth of the
-    /// work. The joints must be finite and in the object's frame.
+    /// A hand without skin, for `PHYSICAL` validity, which takes a thousandth of the time. The joints must be finite and in the
+    /// object's frame.
     pub fn of_joints(joints: HandJoints) -> Self {
         Self {
             palm: joints.palm_skin(),
@@ -146,7 +146,7 @@ impl PresentingHand {
         }
     }
 
-    /// A hand of which only the mesh is known, for either validity.
+    /// A hand known by its mesh alone, for either validity.
     pub fn of_mesh(mesh: Arc<HandMesh>) -> Self {
         Self {
             palm: mesh.palm(),
@@ -199,7 +199,7 @@ pub const FOREARM_LENGTH: f32 = 0.26;
 pub enum Stance {
     /// From anywhere.
     Any,
-    /// Preferably from where a receiver stands who faces the giver; without a giver, rather not from beneath.
+    /// Preferably from a receiver who faces the giver; without a giver, preferably not from beneath.
     #[default]
     Facing,
     /// From this shoulder only.
@@ -228,7 +228,7 @@ pub struct ArmPose {
     pub flexion: f32,
     /// Deviation of the wrist toward the little finger, in radians; negative toward the thumb.
     pub deviation: f32,
-    /// True if the shoulder is not the client's, but where a receiver who faces the giver would have it.
+    /// True if the shoulder was assumed, for a receiver who faces the giver, not given by the client.
     pub is_assumed: bool,
 }
 
@@ -246,13 +246,13 @@ impl Stance {
     }
 }
 
-/// Balls that stand for the hand where an answer of "certainly too close" suffices: as many as a hand of joints has solids.
+/// Number of balls that approximate the hand from inside: as many as a hand of joints has solids.
 const BALLS: usize = 48;
 
-/// Distance of the palm's middle from the wrist in metres: that of an adult.
+/// Distance of the palm's middle from the wrist in metres, for an adult.
 const WRIST_TO_PALM: f32 = 0.08;
 
-/// Somebody's hand as a mesh, with what else of the body belongs to it.
+/// A person's hand as a mesh, which may include more of the body.
 #[derive(Clone, Debug)]
 pub struct HandMesh {
     /// The mesh with search structure. Where it is open, as at the wrist, the winding number decides what is inside.
@@ -274,7 +274,7 @@ impl HandMesh {
         }
     }
 
-    /// The middle of the palm, in metres: an adult's in front of the wrist, or the middle of the mesh's box without one.
+    /// The middle of the palm, in metres: an adult's distance in front of the wrist, or the box's centre if the wrist is unknown.
     pub fn palm(&self) -> Vec3 {
         match self.wrist {
             Some(wrist) => wrist.transform_point(Vec3::NEG_Z * WRIST_TO_PALM),
@@ -310,11 +310,8 @@ pub struct Ball {
     pub radius: f32,
 }
 
-/// Up to `count` balls inside the volume of a mesh, the largest first, none with its centre inside an earlier one. `None` if the
-/// mesh has no volume.
-///
-/// Each touches the surface at a sample and shrinks until it contains no other point of it (Ma, Bae and Choi, "3D medial axis
-/// point approximation using nearest neighbors and the normal field", 2012).
+/// Up to `count` balls inside a mesh's volume, largest first, none centred in an earlier one (Ma, Bae and Choi, "3D medial axis
+/// point approximation using nearest neighbors and the normal field", 2012). `None` if the mesh has no volume.
 pub fn inner_balls(surface: &MeshBvh, count: usize) -> Vec<Ball> {
     let outward = surface.mesh().signed_volume().signum() as f32;
     let sampler = SurfaceSampler::new(surface.mesh(), |_| true);

@@ -1,4 +1,4 @@
-//! Objects that can be grasped, and what their parts are for.
+//! Graspable objects and the functions of their parts.
 
 use std::{
     ops::Deref,
@@ -31,13 +31,13 @@ pub struct GraspObject {
     plain: PlainObject,
     /// Its surface with search structure, which [`Self::with_plain`] shares.
     pub surface: Arc<MeshBvh>,
-    /// How thick it is where a hand may hold it.
+    /// Local thickness of the surface that may be touched.
     pub local_thickness: LocalThickness,
-    /// How flat, long or round it is there.
+    /// Local shape of the surface that may be touched.
     pub local_shape: LocalShape,
     /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried first.
     forbidden_surface: Option<MeshBvh>,
-    /// What its parts are for, found on first use.
+    /// The functions of its parts, found on first use.
     parts: OnceLock<Parts>,
 }
 
@@ -77,7 +77,7 @@ impl GraspObject {
         })
     }
 
-    /// The object of the same mesh that `plain` is, with the search structure and measurements of this one.
+    /// An object for `plain`, which has the same mesh, with the search structure and measurements of this one.
     #[must_use]
     pub fn with_plain(&self, plain: PlainObject) -> Self {
         Self {
@@ -91,10 +91,10 @@ impl GraspObject {
     }
 
     /// The same object, `scale` times as large about the origin of its frame, with the given mass in kilograms. Its bounding
-    /// box is scaled; its surface and what is measured in terms of a hand's size are prepared again, unless the scale is 1.
+    /// box is scaled; surface and measurements relative to a hand's size are prepared again, unless the scale is 1.
     ///
     /// # Errors
-    /// [`Stopped`]; within, why it cannot have this size.
+    /// [`Stopped`]; within, why the size is impossible.
     pub fn resized_until(
         &self,
         scale: f32,
@@ -114,13 +114,13 @@ impl GraspObject {
         )?))
     }
 
-    /// The object without what is derived from it.
+    /// The object without derived data.
     pub fn plain(&self) -> &PlainObject {
         &self.plain
     }
 
-    /// Where a wrist is that holds the object at `scale` times its size as one at its own size does: it keeps its offset from the
-    /// nearest place of the surface.
+    /// Maps a wrist that holds the object to the object at `scale` times its size: the wrist keeps its offset from the nearest
+    /// place of the surface.
     pub fn wrist_at(&self, scale: f32, object_from_wrist: Pose) -> Pose {
         let Pose {
             position,
@@ -139,7 +139,7 @@ impl GraspObject {
         self.plain.banned().iter().map(moved).collect()
     }
 
-    /// How much the place of the surface next to a point is wanted, from 0 to 1; 1 if there is none within `distance` metres.
+    /// The owner's preference for the surface next to a point, from 0 to 1; 1 if no surface is within `distance` metres.
     pub(crate) fn wish_near(&self, point: Vec3, distance: f32) -> f32 {
         if self.regions().is_empty() {
             return 1.0;
@@ -150,7 +150,7 @@ impl GraspObject {
         })
     }
 
-    /// What its parts are for, as the mesh shows. The first call takes some milliseconds.
+    /// The functions of its parts, by its mesh. The first call takes some milliseconds.
     pub fn parts(&self) -> &Parts {
         unstopped(|stop| self.parts_until(stop))
     }
@@ -164,7 +164,7 @@ impl GraspObject {
         Ok(self.parts.get_or_init(|| parts))
     }
 
-    /// Where it can be wrapped. The first call takes as long as that of [`Self::parts`].
+    /// Its handles. The first call takes as long as that of [`Self::parts`].
     pub fn handles(&self) -> &Handles {
         &self.parts().handles
     }
@@ -180,7 +180,7 @@ impl GraspObject {
         surface.is_some_and(|surface| surface.comes_within(capsule, distance))
     }
 
-    /// Memory use in bytes of what is derived; the plain object comes to it.
+    /// Memory use in bytes of derived data, without the plain object.
     pub fn derived_bytes(&self) -> usize {
         let of_forbidden = self.forbidden_surface.as_ref().map_or(0, |surface| {
             let mesh = surface.mesh();
@@ -207,32 +207,31 @@ impl Deref for GraspObject {
     }
 }
 
-/// Points of the surface that are counted, and the seed by which they are drawn.
+/// Number of surface samples that are counted, and their seed.
 const SAMPLES: u64 = 512;
 const SEED: u64 = 0x5041_5254;
 
-/// Share of the surface that handles may take up for them to be what the object is held by: less is an ornament, more is the
-/// whole object, such as a stick.
+/// Range of the surface share of handles by which an object is held: less is an ornament, more the whole object.
 const HANDLE_SHARES: [f32; 2] = [0.03, 0.8];
 
-/// Places found on handles from which they are no accident of the samples.
+/// Fewest places found on handles for these not to be sampling noise.
 const MIN_PLACES: usize = 4;
 
-/// Mean radius in metres from which a slender part is sized for a hand: stems and wires are thinner.
+/// Least mean radius in metres of a slender part sized for a hand: stems and wires are thinner.
 const MIN_RADIUS: f32 = 0.0045;
 
-/// Mass in kilograms below which an object is held by its handle no more than elsewhere: a pen is not a tool's handle.
+/// Mass in kilograms below which a handle is not preferred: a pen is not a tool's handle.
 const HANDLED_MASS: f32 = 0.03;
 
-/// Ratio of the longest to the next side of the box from which an object counts as long, and up to which it does not.
+/// Ratios of the longest to the next side of the box up to which an object is not long, and from which it is fully long.
 const LONG: [f32; 2] = [1.3, 1.6];
 
-/// What an object's parts are for.
+/// The functions of an object's parts.
 #[derive(Clone, Debug)]
 pub struct Parts {
     /// Slender parts that can be wrapped.
     pub handles: Handles,
-    /// True if handles are what sets a part of the object apart, so that people hold it there.
+    /// True if the handles are distinct from the rest of the object, so that people hold it there.
     pub is_handled: bool,
     /// Sharp edges and points.
     pub sharp: SharpFeatures,
@@ -287,7 +286,7 @@ impl Parts {
     }
 }
 
-/// The share of the surface that may be touched which is on main handles.
+/// The share of the touchable surface that is on main handles.
 fn share_on(handles: &Handles, object: &GraspObject) -> f32 {
     if handles.places().is_empty() {
         return 0.0;

@@ -1,4 +1,4 @@
-//! Objects, and the grips that they ban, before anything is derived from them for searching.
+//! Objects and their banned grips, without data derived for searching.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ pub const SKIN_FRICTION: f32 = 0.6;
 /// the error that a request can provoke.
 pub const MAX_NAMED_TRIANGLES: usize = 10;
 
-/// An object as it is kept: what was given of it, and its box. Clones share the mesh.
+/// An object as stored: the given properties and its box. Clones share the mesh.
 #[derive(Clone, Debug)]
 pub struct PlainObject {
     /// Its surface.
@@ -42,9 +42,9 @@ pub struct PlainObject {
     pub friction: Option<f32>,
     /// One flag per triangle: true if it must not be touched.
     forbidden: Arc<[bool]>,
-    /// Which parts hands should take or leave.
+    /// The parts that hands should take or leave.
     regions: Arc<Regions>,
-    /// The grips with which it is not to be taken.
+    /// The banned grips.
     banned: Arc<[BannedGrip]>,
 }
 
@@ -84,7 +84,7 @@ pub enum ResizeError {
     /// Its mass is not a positive number.
     #[error("the mass would be {0} kg; it must be finite and more than 0")]
     Mass(f32),
-    /// Its mesh is no mesh any more.
+    /// Its mesh is invalid at that size.
     #[error("at this size, {0}")]
     Mesh(#[from] MeshError),
 }
@@ -178,7 +178,7 @@ impl PlainObject {
         }
     }
 
-    /// The same object, not to be taken with these grips, in its frame.
+    /// The same object with these banned grips, in its frame.
     #[must_use]
     pub fn with_banned(self, banned: Vec<BannedGrip>) -> Self {
         Self {
@@ -208,17 +208,17 @@ impl PlainObject {
             .count()
     }
 
-    /// Which parts hands should take or leave.
+    /// The parts that hands should take or leave.
     pub fn regions(&self) -> &Regions {
         &self.regions
     }
 
-    /// The grips with which it is not to be taken.
+    /// The banned grips.
     pub(super) fn banned(&self) -> &[BannedGrip] {
         &self.banned
     }
 
-    /// True if the object is to be taken with a wrist there.
+    /// True if the wrist is not near a banned grip.
     pub fn admits_wrist(&self, handedness: Handedness, object_from_wrist: Pose) -> bool {
         let mut banned = self.banned.iter();
         !banned.any(|grip| grip.covers(handedness, object_from_wrist))
@@ -234,7 +234,7 @@ impl PlainObject {
     }
 }
 
-/// One flag per triangle, true if it is forbidden, or everything that is wrong with the properties of an object of so many triangles.
+/// One flag per triangle, true if it is forbidden, or all violations of an object's properties.
 fn checked(
     triangles: usize,
     mass: f32,
@@ -279,16 +279,16 @@ fn checked(
     }
 }
 
-/// A wrist pose around which an object is not to be taken.
+/// A banned wrist pose and its surroundings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BannedGrip {
-    /// The hand; the other one may take the object so.
+    /// The banned hand; the other hand is allowed.
     pub handedness: Handedness,
     /// The wrist in the object's frame.
     pub object_from_wrist: Pose,
-    /// Wrists closer than this are near, in metres, …
+    /// Distance in metres within which a wrist is near, …
     pub distance: f32,
-    /// … if they are turned by less than this, in radians.
+    /// … if it is turned by less than this, in radians.
     pub angle: f32,
 }
 

@@ -1,4 +1,4 @@
-//! Parts of an object that hands should take or leave, as its owner knows them.
+//! Parts of an object that hands should take or leave, as its owner states them.
 
 use glam::Vec3;
 
@@ -8,27 +8,27 @@ use super::{
 };
 use crate::geometry::zone::Zone;
 
-/// Largest share of a preferred region's weight that contacts may miss for what an owner would choose.
+/// Largest share of a preferred region's weight that contacts may miss in a natural grasp.
 pub(crate) const MAX_MISSED: f32 = 0.5;
 
-/// Largest share of weight to avoid under contacts for what an owner would choose.
+/// Largest share of weight to avoid under the contacts of a natural grasp.
 const MAX_AVOIDED: f32 = 0.1;
 
-/// What a region asks of hands.
+/// Preference of a region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wish {
-    /// To take the object elsewhere.
+    /// Hands should take the object elsewhere.
     Avoid,
-    /// To take it there.
+    /// Hands should take it there.
     Prefer,
 }
 
-/// A part of an object's surface: triangles, and what of the surface is in some zones.
+/// A part of an object's surface: triangles, and the surface inside some zones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    /// What it asks of hands.
+    /// The preference.
     pub wish: Wish,
-    /// How much it counts; more than 0, at most 1.
+    /// Its weight; more than 0, at most 1.
     pub weight: f32,
     /// Indices of triangles. Those that do not exist are ignored.
     pub triangles: Vec<u32>,
@@ -36,16 +36,16 @@ pub struct Region {
     pub zones: Vec<Zone>,
 }
 
-/// The regions of an object. By default none.
+/// The regions of an object; none by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Regions {
-    /// In the order of the owner, each with ascending triangles.
+    /// In the owner's order, each with ascending triangles.
     all: Vec<Region>,
     preferred: Marked,
     avoided: Marked,
 }
 
-/// How much the places of a surface count for one of the wishes.
+/// Weights of a surface's triangles for one preference.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Marked {
     /// The weight of each triangle; empty if all are 0.
@@ -56,7 +56,7 @@ struct Marked {
 }
 
 impl Regions {
-    /// Prepares the regions of a surface of so many triangles. Where several of the same wish overlap, the one that counts most
+    /// Prepares the regions of a surface of so many triangles. Where regions of the same preference overlap, the largest weight
     /// decides.
     pub fn new(regions: &[Region], triangles: usize) -> Self {
         let mut prepared = Self {
@@ -74,7 +74,7 @@ impl Regions {
         prepared
     }
 
-    /// The region, by its place among all, with most of the contacts, the first of several; `None` if all contacts are elsewhere.
+    /// Index of the region with most of the contacts, the first of several; `None` if all contacts are elsewhere.
     pub(crate) fn with_most(&self, contacts: &[Contact]) -> Option<usize> {
         let held = |region: &Region| contacts.iter().filter(|at| region.contains(at)).count();
         let counts = self.all.iter().map(held).enumerate();
@@ -87,12 +87,12 @@ impl Regions {
         self.all.is_empty()
     }
 
-    /// True if some are preferred so much that contacts elsewhere are not where the owner wants them.
+    /// True if a grasp with its contacts elsewhere than on preferred regions is not natural.
     pub fn require_contacts(&self) -> bool {
         self.preferred.greatest > MAX_MISSED
     }
 
-    /// Numbers that tell regions apart that want hands at different places.
+    /// Numbers that differ for regions that prefer different places.
     pub fn numbers(&self) -> impl Iterator<Item = f32> {
         [&self.preferred, &self.avoided]
             .into_iter()
@@ -112,13 +112,13 @@ impl Regions {
         scaled
     }
 
-    /// How much a place of the surface is wanted, from 0 to 1: 1 where nothing better is wanted.
+    /// The owner's preference for a place of the surface, from 0 to 1: 1 where no other place is preferred.
     pub fn wish_at(&self, triangle: u32, position: Vec3) -> f32 {
         let missed = self.preferred.greatest - self.preferred.weight_at(triangle, position);
         (1.0 - missed) * (1.0 - self.avoided.weight_at(triangle, position))
     }
 
-    /// The terms of the score that contacts earn; `None` without regions. The share of contacts on preferred regions, and off those
+    /// The score's region terms for contacts; `None` without regions. The share of contacts on preferred regions, and off those
     /// to avoid, each counted by its weight relative to the largest.
     pub fn values(&self, contacts: &[Contact]) -> RegionValues {
         RegionTerm::ALL.map(|term| {
@@ -146,7 +146,7 @@ impl Regions {
     }
 }
 
-/// True if an object's owner would choose contacts that earn this by its regions.
+/// True if contacts with these region terms make a natural grasp.
 pub fn suits_owner(values: &RegionValues) -> bool {
     RegionTerm::ALL.into_iter().zip(values).all(|(term, earned)| {
         let most = match term {
@@ -184,7 +184,7 @@ impl Marked {
         self.greatest = self.greatest.max(region.weight);
     }
 
-    /// How much a place counts, from 0 to the largest weight.
+    /// The weight of a place, from 0 to the largest weight.
     fn weight_at(&self, triangle: u32, position: Vec3) -> f32 {
         let of_triangle = self.triangles.get(triangle as usize).copied().unwrap_or_default();
         self.zones.iter().fold(of_triangle, |most, (zone, weight)| {

@@ -17,11 +17,11 @@ use crate::base::pose::Pose;
 /// Demands on a grasp. The default demands nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Requirements {
-    /// How far the receiver's arm reaches; none: anywhere.
+    /// The reach of the receiver's arm; `None` for any.
     pub reach: Option<Reach>,
-    /// The directions from which the hand may approach; none: any.
+    /// The directions from which the hand may approach; `None` for any.
     pub approach: Option<ApproachCone>,
-    /// The only grasp types allowed; none: any, including grasps without a type.
+    /// The only grasp types allowed; `None` for any, including grasps without a type.
     pub allowed_types: Option<TypeSet>,
     /// Grasp types not allowed. Grasps without a type are unaffected.
     pub excluded_types: TypeSet,
@@ -33,14 +33,14 @@ pub struct Requirements {
     pub worst_comfort: Option<f32>,
 }
 
-/// What requirements say about hooks.
+/// How requirements treat hooks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hooks {
-    /// Nothing else is likely to meet them.
+    /// Only hooks are likely to meet them.
     Demanded,
-    /// They meet them, as others do.
+    /// Hooks and other grasps can meet them.
     Allowed,
-    /// They do not meet them.
+    /// No hook meets them.
     RuledOut,
 }
 
@@ -62,7 +62,7 @@ pub struct ApproachCone {
     pub half_angle: f32,
 }
 
-/// The direction in which a hand moves toward what it grasps, a unit vector in the target frame of
+/// The direction in which a hand moves toward its object, a unit vector in the target frame of
 /// `frame_from_wrist`. It is halfway between the direction of the fingers (+y of the wrist frame) and of the palm
 /// (+z), since a hand leads with both.
 pub fn approach_direction(frame_from_wrist: Pose) -> Vec3 {
@@ -132,7 +132,7 @@ impl Requirements {
         }
     }
 
-    /// True if the grasp type is allowed; pass none for a grasp without a type.
+    /// True if the grasp type is allowed; pass `None` for a grasp without a type.
     pub fn admits_type(&self, grasp_type: Option<GraspType>) -> bool {
         match grasp_type {
             None => self.allowed_types.is_none(),
@@ -226,7 +226,7 @@ impl FromIterator<Digit> for DigitSet {
     }
 }
 
-/// A check that a valid grasp passes, or what keeps a hand from all of them. Each comes with a figure.
+/// A check of a grasp, or a limit that no grasp of a hand can pass. Each comes with a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
     /// The angles are within the rig's limits; the largest excess in radians.
@@ -234,27 +234,27 @@ pub enum Check {
     /// The hand is no deeper in the object than flesh yields; the largest depth in metres.
     Penetration,
     /// Hand and forearm are clear of other people's hands; the least distance in metres, negative inside. As a limit: the room that
-    /// the giver's hands leave above the freest place that may be held, and the room that a finger needs.
+    /// the giver's hands leave above the freest touchable place, and the room that a finger needs.
     GiverClearance,
-    /// The part of it that is about other hands than the giver's, where the two are distinguished.
+    /// The same for hands other than the giver's, where the two are distinguished.
     OtherHandsClearance,
-    /// Hand and forearm are clear of obstacles; the least distance in metres, negative inside. As a limit: the share of the grips
-    /// that would hold the object which obstacles are in the way of; no proof, as known grips are many, not all.
+    /// Hand and forearm are clear of obstacles; the least distance in metres, negative inside. As a limit: the share of known
+    /// grips that obstacles block; no proof, since other grips may exist.
     ObstacleClearance,
     /// No part of the hand goes through another; the least distance in metres, negative where they overlap.
     SelfCollision,
     /// The hand touches the object; the number of contacts.
     Contacts,
-    /// The hand keeps off forbidden surfaces; the least distance in metres. As a limit: the share of the surface's area that is
-    /// forbidden, so that no two of the remaining places can be pressed against each other by one hand.
+    /// The hand keeps off forbidden surfaces; the least distance in metres. As a limit: the forbidden share of the surface's area,
+    /// which leaves no two places that one hand can press against each other.
     Forbidden,
     /// The contacts have closure; their epsilon, and the required one unless the object could only hang in the fingers.
     Closure,
-    /// The contacts carry the weight; the unbalanced share of it.
+    /// The contacts carry the weight; its unbalanced share.
     Balance,
-    /// The receiver's arm reaches the wrist, within the requirements. Of a verdict, how much farther it would have to reach, in
-    /// metres; of a failed check, the distance from the shoulder, if that decides; as a limit, the distance from the shoulder to
-    /// the nearest place that may be held, and that to the farthest contact within reach.
+    /// The receiver's arm reaches the wrist, within the requirements. In a verdict, how much farther it would have to reach, in
+    /// metres; in a failed check, the distance from the shoulder, if that decides; as a limit, the distance from the shoulder to
+    /// the nearest touchable place, and the distance to the farthest contact within reach.
     Reach,
     /// The hand approaches from within the requirements' cone.
     Approach,
@@ -264,7 +264,7 @@ pub enum Check {
     GraspType,
     /// The forces are as comfortable as the requirements demand.
     Comfort,
-    /// The requirements but for reach are met: the last four together.
+    /// All requirements but reach are met: the last four together.
     Requirements,
     /// The hand is not near a banned grip.
     Banned,
@@ -272,8 +272,8 @@ pub enum Check {
     Score,
     /// The object's mass, and the largest mass that all contacts of a hand can carry, in kilograms.
     Mass,
-    /// The weight's torque about the nearest place that may be held, and the largest torque of all contacts of a hand
-    /// there, in newton metres.
+    /// The weight's torque about the nearest touchable place, and the largest torque of all contacts of a hand there, in newton
+    /// metres.
     Torque,
     /// The distance between the closest places that can be pressed against each other, and how far apart a hand can press, in
     /// metres.
@@ -285,7 +285,7 @@ pub enum Check {
 }
 
 impl Check {
-    /// The checks of a hand that somebody posed.
+    /// The checks of a posed hand.
     pub const OF_HAND: [Self; 12] = [
         Self::JointLimits,
         Self::Penetration,

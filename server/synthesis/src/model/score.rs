@@ -20,15 +20,15 @@ pub enum Term {
     Ease,
     /// Neighbouring fingers bend by similar angles.
     SharedFlexion,
-    /// As much of the hand holds as the load calls for: fingers for what is light, all and the palm for what is heavy or held
-    /// far from its centre of mass.
+    /// As much of the hand holds as the load requires: fingers for a light one, the whole hand for one that is heavy or held far
+    /// from its centre of mass.
     EnoughDigits,
     /// The digits touch with their pads, not with their sides.
     Pads,
     /// The grasp belongs with high confidence to a type of the taxonomy. Grasps without a type look unnatural (thesis
     /// 5.2 and 6.1).
     NaturalType,
-    /// The Ferrari-Canny epsilon is well above what validity requires.
+    /// The Ferrari-Canny epsilon is well above the required one.
     Closure,
     /// The grasp is stiff against pushes: palm and proximal phalanges, or many digits, support the object.
     Steadiness,
@@ -38,7 +38,7 @@ pub enum Term {
     GiverClearance,
     /// The hand keeps its distance from forbidden surfaces.
     SterileDistance,
-    /// The forearm comes from where the receiver stands.
+    /// The forearm comes from the receiver.
     Stance,
     /// The hand comes from the side or from above, not from beneath.
     FromSideOrAbove,
@@ -57,8 +57,8 @@ pub enum Term {
 }
 
 /// All terms: name, weight, and whether it depends on the hand and the object alone. Firmness is weighted by how well it predicts
-/// which grips survive pushes from all sides in an independent simulation. Where a hand comes from and what it holds are what
-/// people notice first: weighted by how well they tell hands that people would choose from others (`tests/src/pairs.csv`).
+/// which grips survive pushes from all sides in an independent simulation; the hand's direction and place, which people notice
+/// first, by how well they tell natural hands from others (`tests/src/pairs.csv`).
 const TABLE: [(Term, &str, f32, bool); TERMS] = [
     (Term::Comfort, "comfort", 1.0, false),
     (Term::FrictionReserve, "friction_reserve", 10.0, false),
@@ -144,12 +144,12 @@ impl RegionTerm {
 /// Weight in the mean of a region term of the greatest importance.
 const REGION_WEIGHT: f32 = 30.0;
 
-/// What a grasp earns by an object's regions.
+/// A region term's value for a grasp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionValue {
     /// From 0 (worst) to 1 (best).
     pub value: f32,
-    /// How much it counts: the largest weight of a region, more than 0 and at most 1.
+    /// Its importance: the largest weight of a region, more than 0 and at most 1.
     pub importance: f32,
 }
 
@@ -160,7 +160,7 @@ impl RegionValue {
     }
 }
 
-/// The values of [`RegionTerm::ALL`]; `None` for what the object has no regions of.
+/// The values of [`RegionTerm::ALL`]; `None` if the object has no such regions.
 pub(crate) type RegionValues = [Option<RegionValue>; RegionTerm::ALL.len()];
 
 /// A term of one score.

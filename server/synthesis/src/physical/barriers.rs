@@ -1,4 +1,4 @@
-//! What a hand keeps clear of in addition to the object: other people's hands, and obstacles.
+//! Barriers that a hand keeps clear of in addition to the object: other people's hands, and obstacles.
 
 use std::{fmt, sync::Arc};
 
@@ -22,11 +22,10 @@ pub(super) const CLOSER_TO_OBSTACLES: f32 = 0.0009;
 /// Clearance between the hand and forearm and obstacles, in metres.
 pub const OBSTACLE_CLEARANCE: f32 = GIVER_CLEARANCE - CLOSER_TO_OBSTACLES;
 
-/// Comparisons of prepared hands that take as long as one with a mesh, about.
+/// Approximate cost of a comparison with a mesh, in comparisons of prepared hands.
 const MESH_COMPARISONS: usize = 16;
 
-/// An obstacle prepared for comparison with many hands. All its distances are longer by `CLOSER_TO_OBSTACLES` than they
-/// are, so that one threshold serves hands and obstacles.
+/// A prepared obstacle. `CLOSER_TO_OBSTACLES` is added to its distances, so that one threshold serves hands and obstacles.
 #[derive(Clone, Copy, Debug)]
 pub enum PreparedObstacle {
     /// A capsule.
@@ -40,8 +39,7 @@ pub enum PreparedObstacle {
 pub struct Barriers<'a> {
     /// The hands, the giver's first.
     pub hands: &'a [PreparedHand],
-    /// Those of these hands of which the mesh is known. As prepared, they are what is certainly inside; distances are from
-    /// the mesh.
+    /// The hands given as meshes. Their prepared solids lie certainly inside; distances are from the mesh.
     pub meshes: &'a [Arc<HandMesh>],
     /// The obstacles.
     pub obstacles: &'a [PreparedObstacle],
@@ -99,14 +97,14 @@ impl PreparedObstacle {
 }
 
 impl<'a> Barriers<'a> {
-    /// Nothing to keep clear of.
+    /// No barriers.
     pub const NONE: Barriers<'static> = Barriers {
         hands: &[],
         meshes: &[],
         obstacles: &[],
     };
 
-    /// One giver's hand and nothing else.
+    /// A giver's hand alone.
     pub const fn of_giver(giver: &'a PreparedHand) -> Self {
         Self {
             hands: std::slice::from_ref(giver),
@@ -114,12 +112,12 @@ impl<'a> Barriers<'a> {
         }
     }
 
-    /// True if there is nothing to keep clear of.
+    /// True without barriers.
     pub fn is_empty(&self) -> bool {
         self.hands.is_empty() && self.obstacles.is_empty()
     }
 
-    /// The number of comparisons between two clock checks, of which `with_giver` are due with a single hand.
+    /// The number of comparisons between two polls of the stop signal, given their number with a single hand.
     pub(crate) fn comparisons_per_check(&self, with_giver: usize) -> usize {
         let meshes = MESH_COMPARISONS * self.meshes.len();
         (with_giver / (self.hands.len().max(1) + self.obstacles.len() + meshes)).max(1)
@@ -151,8 +149,8 @@ impl<'a> Barriers<'a> {
             })
     }
 
-    /// How far some spheres have to move together, in metres, to be `distance` away from every obstacle that they are too
-    /// close to now: out of one after the other, each time by the sphere that is deepest.
+    /// The common translation, in metres, that takes some spheres `distance` away from every obstacle that they are too
+    /// close to: out of one after the other, each time by the deepest sphere.
     pub(crate) fn way_out_of_obstacles(&self, spheres: &[Spheres], distance: f32) -> Vec3 {
         self.obstacles.iter().fold(Vec3::ZERO, |way, obstacle| {
             let depth = |(centre, radius): (Vec3, f32)| {
@@ -293,7 +291,7 @@ impl<'a> Barriers<'a> {
     }
 }
 
-/// Something to keep clear of, by its place in the holdout; displayed as the field of a request.
+/// A barrier by its place in the holdout; displayed as the field of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Barrier {
     /// The giver's hand.
@@ -321,9 +319,9 @@ pub(crate) struct Nearest {
     pub distance: f32,
     /// The part of the hand that is nearest.
     pub part: SolidPart,
-    /// A point there: of the hand's skin or, with the mesh of a hand, of that, in the object's frame.
+    /// A point there, in the object's frame: of the hand's skin, or of the mesh if the barrier is one.
     pub at: Vec3,
-    /// What it is nearest to.
+    /// The nearest barrier.
     pub barrier: Barrier,
 }
 

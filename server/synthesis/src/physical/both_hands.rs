@@ -103,8 +103,7 @@ pub(crate) fn hold_together(
     })
 }
 
-/// Hand and place of the contacts that bear load: all, or the [`MAX_CONTACTS`] that are left without those closest to
-/// another one of their hand, which add least.
+/// Hand and index of the contacts that bear load: at most [`MAX_CONTACTS`], without those closest to others of their hand.
 fn bearing_contacts(contacts: [&[Contact]; 2]) -> Vec<(usize, usize)> {
     let mut bearing: Vec<(usize, usize)> = (0..2)
         .flat_map(|hand| (0..contacts[hand].len()).map(move |place| (hand, place)))
@@ -124,21 +123,19 @@ fn bearing_contacts(contacts: [&[Contact]; 2]) -> Vec<(usize, usize)> {
     bearing
 }
 
-/// Largest angle between the forearms, as its cosine: 110°. Wider ones would embrace the object.
+/// Cosine of the largest angle between the forearms: 110°. A wider one would embrace the object.
 const MIN_FOREARM_COS: f32 = -0.342;
 
 /// Range of a forearm's rise from the elbow to the wrist, as sines: from 58° down to 64° up.
 const FOREARM_RISE: [f32; 2] = [-0.85, 0.9];
 
-/// Smallest height of the thumb's side of the hand over the other side, as the sine of its slope: forearms twist from
-/// palm up over thumb up to palm down, and little farther.
+/// Sine of the least slope from the little finger's side up to the thumb's: forearms twist little past palm up and palm down.
 const MIN_THUMB_RISE: f32 = -0.4;
 
-/// Weight of the thumbs' side against the fingers' direction where the body faces: only hands that reach straight up,
-/// down or inward need it.
+/// Weight of the thumbs' side against the fingers' direction in where the body faces, for hands that reach up, down or inward.
 const THUMB_WEIGHT: f32 = 0.5;
 
-/// Shortest sum of the hands' horizontal directions from which it is known where the body faces.
+/// Shortest sum of the hands' horizontal directions that shows where the body faces.
 const MIN_FACING: f32 = 0.3;
 
 /// How far a hand may point back at its body: the cosine of 96°.
@@ -147,8 +144,7 @@ const MIN_FORWARD_COS: f32 = -0.1;
 /// How far the right hand may be to the left of the left one, in metres: a finger's breadth, for hands one above the other.
 const MAX_CROSSING: f32 = 0.02;
 
-/// Range of the elbows' distance, in metres: from close together in front of the body, measured across it, to as far apart
-/// as shoulders of 0.36 m and upper arms of 0.3 m allow.
+/// Range of the elbows' distance across the body, in metres: up to the width that shoulders and upper arms allow.
 const ELBOW_DISTANCES: [f32; 2] = [0.1, 0.9];
 
 /// True if the hands of two rigs with these wrist poses suit one upright body: forearms from the same side, twisted no

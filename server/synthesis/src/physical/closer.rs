@@ -25,8 +25,7 @@ use crate::{
     },
 };
 
-/// Flexions in radians, in order of preference, that take an idle finger clear of the barriers: tucked into the palm, or
-/// nearly straight.
+/// Flexions in radians that take an idle finger clear of the barriers: tucked into the palm or, else, nearly straight.
 const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
 
 /// Total flexion of a relaxed thumb, in radians: a thumb that lies next to the index finger is nearly straight.
@@ -37,7 +36,7 @@ const RESTING_THUMB_FLEXION: f32 = 0.35;
 pub(super) struct Closer<'a> {
     /// The object being grasped.
     pub scene: &'a ObjectScene<'a>,
-    /// What the hand keeps clear of.
+    /// The barriers that the hand keeps clear of.
     pub barriers: Barriers<'a>,
     /// The rig of the closing hand.
     pub rig: &'a Rig,
@@ -48,7 +47,7 @@ pub(super) struct Closer<'a> {
 }
 
 impl<'a> Closer<'a> {
-    /// What closes the digits of a posed hand.
+    /// The closer of a posed hand's digits.
     pub(super) fn of_pose(
         scene: &'a ObjectScene<'a>,
         rig: &'a Rig,
@@ -164,7 +163,7 @@ impl<'a> Closer<'a> {
         rested
     }
 
-    /// The digits with what they touch as they are.
+    /// The digits, unmoved, with their touches.
     pub(super) fn touching(&self, digits: &[ClosedDigit; 5]) -> [ClosedDigit; 5] {
         let mut touching = *digits;
         for digit in Digit::ALL.into_iter().filter(|&digit| self.rig.has(digit)) {
@@ -189,8 +188,7 @@ impl<'a> Closer<'a> {
     }
 }
 
-/// Distance, in metres, that a digit stops short of the depth that soft flesh allows ([`SOFT_CONTACT`]) in another
-/// part of the hand: it absorbs the tolerance of the search for a touch.
+/// Distance, in metres, that a digit stops short of [`SOFT_CONTACT`]: it absorbs the tolerance of the search for a touch.
 const OBSTACLE_MARGIN: f32 = 0.001;
 
 /// A part of the hand that a digit does not go through.
@@ -216,7 +214,7 @@ impl Obstacle {
         solids.palm.iter().map(|solid| Self::new(*solid, PALM_PART))
     }
 
-    /// What stops the fingers besides the palm: the thumb and its ball.
+    /// The thumb and its ball, which stop the fingers in addition to the palm.
     pub fn of_thumb(solids: &HandSolids) -> impl Iterator<Item = Self> {
         let [thumb, ..] = &solids.phalanges;
         let links = thumb
@@ -236,8 +234,7 @@ impl Obstacle {
         link > 0 || self.part < PALM_PART
     }
 
-    /// A lower bound on the gap to a link in metres, with the depth that soft flesh allows and that of their overlap at rest
-    /// added; exact if it is below [`COARSE_GAP`] and `enough`.
+    /// A lower bound on the gap to a link in metres, plus the allowed overlap; exact below [`COARSE_GAP`] and `enough`.
     pub(super) fn gap(&self, link: &Bounded, rest_overlap: f32, enough: f32) -> f32 {
         let flesh = SOFT_CONTACT - OBSTACLE_MARGIN + rest_overlap;
         let lower_bound = self.solid.distance_lower_bound(link) + flesh;
@@ -263,8 +260,8 @@ pub(crate) struct Evaded {
     pub moved: [bool; 5],
 }
 
-/// Moves the digits of a hand that are too close to barriers, each as little as it takes. The others stay as they are. `None`
-/// if palm or forearm are too close, too, or if a digit has nowhere to go.
+/// Moves the digits that are too close to barriers, each as little as it takes. The others keep their poses. `None` if palm
+/// or forearm are too close, or if a digit has nowhere to go.
 pub(crate) fn evade(
     scene: &ObjectScene<'_>,
     rig: &Rig,
@@ -293,7 +290,7 @@ pub(crate) fn evade(
     Some(evaded)
 }
 
-/// What moves with a digit.
+/// The solids that move with a digit.
 fn parts_of(digit: Digit, solids: &HandSolids) -> impl Iterator<Item = &TaperedCapsule> + Clone {
     let ball: &[TaperedCapsule] = if digit == Digit::Thumb {
         &solids.thenar

@@ -28,11 +28,10 @@ pub(super) const TOUCH_TOLERANCE: f32 = 0.0001;
 /// A part of the hand touches below this clearance, in metres.
 pub(super) const TOUCHING: f32 = -TOUCH_DEPTH + 2.0 * TOUCH_TOLERANCE;
 
-/// A link deeper than this in a surface, in metres, counts as starting inside it.
+/// Depth in metres beyond which a link starts inside a surface.
 const INSIDE_DEPTH: f32 = TOUCH_DEPTH + 0.0005;
 
-/// A link below this clearance, in metres, is deeper than [`INSIDE_DEPTH`] whatever the rounding. A cheap early exit:
-/// it saves a fifth of an attempt's time on a mug.
+/// A link below this clearance, in metres, is certainly deeper than [`INSIDE_DEPTH`]: a cheap early exit.
 const CERTAINLY_INSIDE: f32 = -INSIDE_DEPTH - TOUCH_TOLERANCE;
 
 /// Clearance between a relaxed digit and the object, in metres: just enough to be visible.
@@ -41,10 +40,10 @@ const RELAXED_CLEARANCE: f32 = 0.001;
 /// Fractions of full closure tried as starts for relaxing a digit that cannot be opened.
 const CURLED: [f32; 3] = [0.35, 0.7, 1.0];
 
-/// Shares of the preshape tried as starts for hooking: straighter fingers meet what is below the handle.
+/// Shares of the preshape tried as starts for hooking: straighter fingers hit parts below the handle.
 const HOOKED: &[f32] = &[1.0, 0.92, 0.84, 0.76, 0.65];
 
-/// Shares of a digit's bend tried as starts when it was posed by somebody, and the share up to which it bends to touch.
+/// Shares of a posed digit's bend tried as starts, and the share up to which it bends to touch.
 const LESS_BENT: [f32; 5] = [1.0, 0.93, 0.85, 0.7, 0.5];
 const MORE_BENT: f32 = 1.15;
 
@@ -74,7 +73,7 @@ impl ClosedDigit {
         self.touches.contains(&true)
     }
 
-    /// A digit that stays as it is.
+    /// A digit that keeps its pose.
     pub(super) fn as_posed(angles: DigitAngles, links: [TaperedCapsule; 3], surface: &MeshBvh) -> Self {
         Self {
             angles,
@@ -105,10 +104,10 @@ pub struct Closing<'a> {
     pub preshape: f32,
     /// Other parts of the hand that stop the digit.
     pub obstacles: &'a [Obstacle],
-    /// How deep the digit's links overlap these at rest.
+    /// Depths at which the digit's links overlap these parts at rest.
     pub rest_overlaps: Option<&'a [LinkOverlaps; 3]>,
-    /// Whether the last joint stays straight until the others are stopped. A fingertip that curls early meets what hangs in
-    /// the finger before the finger supports it.
+    /// Whether the last joint stays straight until the others are stopped, so that the fingertip does not meet a hanging load
+    /// before the finger supports it.
     pub curls_last: bool,
 }
 
@@ -128,7 +127,7 @@ impl Closing<'_> {
             let sweep = Sweep { start: angles, rates };
             angles = self.advance(&sweep, -TOUCH_DEPTH, f32::INFINITY);
             let links = self.links(&angles);
-            // The outermost link that touches now stops all joints below it.
+            // The outermost touching link stops all joints below it.
             let held = (free..3).rev().find_map(|link| {
                 let touches = self::touches(&links[link], self.surface);
                 (touches || self.gap_to_obstacles(link, &links[link], TOUCHING) < TOUCHING)
@@ -156,8 +155,8 @@ impl Closing<'_> {
         })
     }
 
-    /// A digit that was posed by somebody: bent, each joint in proportion to its angle, until its first touch. Starts where it was
-    /// posed, or less bent if it is inside something there; keeps that if nothing is near. `None` if it is inside however it bends.
+    /// Closes a posed digit, each joint in proportion to its angle, until its first touch. Starts at its pose, or less bent if that
+    /// is inside something, and stays there if nothing is near. `None` if every start is inside.
     pub(super) fn settle(&self, posed: DigitAngles) -> Option<ClosedDigit> {
         let [base_yaw, first, second, third] = posed.to_array();
         let bent_by =
@@ -175,7 +174,7 @@ impl Closing<'_> {
         Some(if bent.touches_object() { bent } else { at_start })
     }
 
-    /// The poses to close from, preferred ones first.
+    /// The poses to close from, in order of preference.
     fn starts(&self) -> impl Iterator<Item = DigitAngles> {
         let straight = self.flexing.opened().third_pitch;
         let shares = if self.curls_last { HOOKED } else { &[1.0, 0.5, 0.0] };
@@ -201,7 +200,7 @@ impl Closing<'_> {
             start,
             rates: self.flexing.rates(),
         };
-        // How far the sweep takes the total flexion there, ignoring joint limits.
+        // The sweep to that total flexion, ignoring joint limits.
         let bent: f32 = start.pitches().iter().sum();
         let way = (flexion - bent).max(0.0) / sweep.rates.iter().sum::<f32>();
         let angles = self.advance(&sweep, RELAXED_CLEARANCE, way);
@@ -212,8 +211,7 @@ impl Closing<'_> {
         }
     }
 
-    /// Sweeps until the clearance of a moving link drops to `target` metres, or for `max_sweep` radians. Links must
-    /// start outside the object's volume, since only the distance to the surface is measured.
+    /// Sweeps until a moving link's clearance drops to `target` metres, or for `max_sweep` radians. Links must start outside.
     fn advance(&self, sweep: &Sweep, target: f32, max_sweep: f32) -> DigitAngles {
         let max_sweep = max_sweep.min(self.flexing.full_sweep(sweep));
         let mut swept = 0.0;
@@ -235,7 +233,7 @@ impl Closing<'_> {
                 if clear_until[link] > swept {
                     continue;
                 }
-                // Gaps beyond what the rest of the sweep can close do not matter.
+                // Gaps that the rest of the sweep cannot close do not matter.
                 let reachable = target + 2.0 * TOUCH_TOLERANCE + speed * (max_sweep - swept);
                 let free = self.gap(link, &links[link], reachable) - target;
                 if free <= TOUCH_TOLERANCE {
@@ -248,8 +246,7 @@ impl Closing<'_> {
         self.flexing.angles_at(sweep, swept)
     }
 
-    /// A lower bound, in metres, on the gap between a link and the surface or obstacles; exact if it is below
-    /// [`COARSE_GAP`] and `reachable`.
+    /// A lower bound, in metres, on the gap to the surface or obstacles; exact below [`COARSE_GAP`] and `reachable`.
     fn gap(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
         let obstructed = self.gap_to_obstacles(index, link, reachable);
         let lower_bound = self.surface.gap_lower_bound(link);
@@ -286,11 +283,8 @@ impl Closing<'_> {
             && links.iter().fold(INSIDE_DEPTH, smallest) >= -INSIDE_DEPTH
     }
 
-    /// Upper bounds on how fast each link's gap can shrink, in metres per radian of the rest of a sweep.
-    ///
-    /// A link is a union of spheres, which rotate in place, so only the speeds of their centres count; the fastest is
-    /// at an end of the link. A joint at its limit no longer turns. As the digit bends, its parts come closer to the
-    /// joints that carry them.
+    /// Upper bounds on how fast each link's gap can shrink, in metres per radian of the rest of a sweep. A link is a union of
+    /// spheres, of which only the centres move, fastest at an end. As the digit bends, its parts approach the joints behind them.
     fn speeds(&self, sweep: &Sweep, angles: &DigitAngles, links: &[TaperedCapsule; 3]) -> [f32; 3] {
         let (pitches, max) = (angles.pitches(), self.flexing.digit.limits.max_pitches());
         let rate = |joint: usize| {

@@ -17,20 +17,19 @@ use crate::{
 };
 
 /// Torsion that a contact bears per newton of normal force, divided by friction, in metres: two thirds of the radius
-/// of an evenly pressed disk, here of 5 mm. Larger values let two fingers hold what would twist out of them.
+/// of an evenly pressed disk, here of 5 mm. Larger values accept pinches that the object would twist out of.
 pub(crate) const TORSION_LEVER: f32 = 0.0033;
 
 /// Cosine of the largest angle between a contact's normal and the direction to the bone: a touch, not a scrape.
 pub(crate) const FACING_COS: f32 = 0.5;
 
-/// Cosine of the angle within which the direction to the bone counts as the triangle's normal. Contact points are
-/// exact to some hundredths of a millimetre under flesh at least 6 mm thick. Larger angles flatten blunt edges.
+/// Cosine of the angle within which the direction to the bone counts as the triangle's normal. Larger angles flatten blunt edges.
 const FACE_NORMAL_COS: f32 = 0.9962;
 
 /// Distance from a touch within which triangles meet there, in metres: its coordinates are rounded.
 const MEETING: f32 = 1e-6;
 
-/// Smallest distance between contacts of the palm, in metres: its solids overlap, and several touch with the same patch of skin.
+/// Smallest distance between contacts of the palm, in metres: its solids overlap, and several touch at the same skin.
 const PALM_SPACING: f32 = 0.015;
 
 /// Largest distance of a palm contact from the palm described by the joints' radii, in metres.
@@ -62,7 +61,7 @@ pub(super) fn collect_contacts(
     }
     let first_palm_contact = contacts.len();
     let tracked = TrackedPalm::of_rig(rig, pose.frame_from_wrist);
-    // The ball of the thumb yields with its metacarpal, and the web is a fold of skin: neither bears load.
+    // The ball of the thumb yields with its metacarpal, and the web is a fold of skin; they bear no load.
     for solid in &solids.palm {
         let Some(touch) = closest(solid, &object.surface, TOUCHING) else {
             continue;
@@ -116,8 +115,7 @@ fn contact(surface: &MeshBvh, solids: &HandSolids, touch: &CapsuleGap, part: Han
     })
 }
 
-/// The triangle that is pressed at a touch and its normal on the side of the bone: at an edge or corner, of those that meet there, the
-/// one that faces the bone most. Which of them was found is a matter of rounding.
+/// The triangle pressed at a touch, of several that meet there the one that faces the bone most, and its normal toward the bone.
 fn pressed_face(surface: &MeshBvh, touch: &CapsuleGap, outward: Vec3) -> (u32, Vec3) {
     let found = facing_normal(outward, surface.mesh().normal(touch.triangle as usize));
     let mut pressed = (touch.triangle, found);
@@ -140,8 +138,7 @@ pub(crate) fn contact_normal(solids: &HandSolids, part: HandPart, point: Vec3, o
     pressed_normal(outward, facing_normal(outward, of_triangle))
 }
 
-/// The triangle's normal on the side of the bone: a sheet is pressed from both sides. A hand with a bone behind a solid's
-/// surface is rejected anyway.
+/// The triangle's normal on the side of the bone: a sheet is pressed from both sides.
 fn facing_normal(direction_to_bone: Vec3, of_triangle: Vec3) -> Vec3 {
     if direction_to_bone.dot(of_triangle) < 0.0 {
         -of_triangle
@@ -150,8 +147,7 @@ fn facing_normal(direction_to_bone: Vec3, of_triangle: Vec3) -> Vec3 {
     }
 }
 
-/// Inside a triangle, round flesh presses along the triangle's normal; at an edge or corner, along the direction to
-/// the bone, which lies between the normals that meet there.
+/// The direction of pressure: the normal inside a triangle, the direction to the bone at an edge or corner.
 fn pressed_normal(direction_to_bone: Vec3, of_triangle: Vec3) -> Vec3 {
     if direction_to_bone.dot(of_triangle) > FACE_NORMAL_COS {
         of_triangle

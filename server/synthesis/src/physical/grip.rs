@@ -38,8 +38,8 @@ use crate::{
 /// under a firm grip. Larger values let hands look sunken.
 pub const MAX_PENETRATION: f32 = 0.002;
 
-/// Clearance between the receiving hand and forearm and other hands, in metres; how much closer obstacles may be is up to
-/// [`Barriers`]. Larger values are safer and find fewer grasps.
+/// Clearance between the receiving hand and forearm and other hands, in metres; [`Barriers`] lets obstacles be closer. Larger
+/// values are safer and find fewer grasps.
 pub const GIVER_CLEARANCE: f32 = 0.001;
 
 /// Clearance between the hand and forbidden surfaces, in metres: flesh may yield by two millimetres, and skin is one
@@ -76,10 +76,9 @@ pub struct Gripper {
     pub posed: Vec<DigitAngles>,
     /// Contacts of the hand.
     pub contacts: Vec<Contact>,
-    /// Whether another hand's contacts complete its own: closure is left to [`super::both_hands`], and its grips have an
-    /// epsilon of 0.
+    /// Whether another hand holds, too: closure is left to [`super::both_hands`], and epsilon is 0.
     is_shared: bool,
-    /// Whether what an idle digit rests on counts as contact.
+    /// Whether the touch of an idle digit at rest counts as contact.
     counts_resting: bool,
     obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
@@ -99,8 +98,8 @@ impl Gripper {
         }
     }
 
-    /// Closes hands that are answers. Where an idle digit has no room and rests on the object, it holds it; the grips that
-    /// atlases grow leave such digits out of account.
+    /// Closes hands for answers. An idle digit that has no room and rests on the object holds it; grips in atlases ignore such
+    /// digits.
     pub fn answering() -> Self {
         Self {
             counts_resting: true,
@@ -195,7 +194,7 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
-        // One without room may rest on the object, and holds it then.
+        // An idle finger without room rests on the object, and then holds it.
         let resting = if self.counts_resting {
             closer.touching(&digits)
         } else {
@@ -269,8 +268,7 @@ impl Gripper {
         Ok((grip, solids))
     }
 
-    /// The epsilon of the contacts, if they enclose the object or it hangs in the closed digits; 0 if another hand helps. `up` is
-    /// the unit vector against gravity; nothing hangs without.
+    /// The epsilon of the contacts if they have closure or the object hangs, which needs `up`; 0 if another hand helps.
     fn enclosure(&mut self, closer: &Closer<'_>, closed: &[ClosedDigit; 5], up: Option<Vec3>) -> Option<f32> {
         let Closer { scene, shape, .. } = closer;
         if self.is_shared {
@@ -279,7 +277,7 @@ impl Gripper {
         if !shape.is_hook() {
             return self.opposed_closure(scene);
         }
-        // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
+        // Fingers that should hook but hold nothing point past the handle; one such finger looks natural.
         let closing = (1..5).filter(|&finger| shape.closing[finger]);
         let touching = closing.clone().filter(|&finger| closed[finger].touches_object());
         let enough_touch = touching.count() >= closing.count().min(3);
@@ -347,8 +345,7 @@ fn opened(rig: &Rig, proposal: &Proposal) -> HandPose {
     }
 }
 
-/// The offset along the wrist's +z at which palm or thenar touch. `None` if they start inside the object or touch
-/// nothing within `max_advance` metres.
+/// The offset along the wrist's +z at which palm or thenar touch; `None` if they start inside or touch nothing.
 fn palm_advance(
     scene: &ObjectScene<'_>,
     still: &HandSolids,
@@ -396,8 +393,7 @@ fn collides_without_digits(scene: &ObjectScene<'_>, barriers: Barriers<'_>, stil
         || barriers.comes_within(still.still(), GIVER_CLEARANCE)
 }
 
-/// The deepest penetration into the object in metres. `None` if it is too deep, the hand is too close to a barrier,
-/// or parts of the hand go through each other.
+/// The deepest penetration in metres; `None` if too deep, too close to a barrier, or if the hand goes through itself.
 fn penetration(
     scene: &ObjectScene<'_>,
     rig: &Rig,

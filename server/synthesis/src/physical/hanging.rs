@@ -1,14 +1,14 @@
 //! Hooks: a load that hangs in bent fingers, held by its weight.
 //!
 //! A hook resists no push from below, so closure says nothing about it. Instead, the load must hang, the fingers must
-//! enclose what it hangs by, and the contacts must carry the weight.
+//! enclose its handle, and the contacts must carry the weight.
 //!
-//! **The load hangs.** It swings like a pendulum about what the fingers hold until its centre of mass is below. The
+//! **The load hangs.** It swings like a pendulum about the held part until its centre of mass is below. The
 //! forces that carry it are those of the load at rest, with the hand as it is ([`Hang::load_at_rest`]). A load that
 //! would have to swing far does not count as hanging.
 //!
-//! **The fingers enclose it.** To what hangs in a finger, a push to the side by a share s of the weight tilts gravity by
-//! tan⁻¹ s. It stays while the way out leads uphill on either side. From where it rests, the finger goes over a distance
+//! **The fingers enclose it.** For a load in a finger, a push to the side by a share s of the weight tilts gravity by
+//! tan⁻¹ s. The load stays while the way out leads uphill on either side. From where it rests, the finger extends a distance
 //! r to the side and a height h up to its knuckle, or to its tip; the way out is h − s r high along the tilted
 //! vertical, times cos(tan⁻¹ s). Friction only helps.
 
@@ -20,19 +20,19 @@ use crate::model::{
     hand::{Digit, HandPart, Phalanx},
 };
 
-/// Push to the side that what hangs must bear, as a share of the weight: a load that is carried at a walk swings as
-/// much. A larger share asks for fingers that are bent further.
+/// Push to the side that a hanging load must bear, as a share of the weight: a load that is carried at a walk swings as
+/// much. A larger share requires fingers that are bent further.
 pub const SIDEWAYS_SHARE: f32 = 0.2;
 
 /// Smallest height of the way out of a finger under [`SIDEWAYS_SHARE`], in metres: flesh yields by less. A larger one
-/// asks for more of the fingertip on the far side.
+/// requires more of the fingertip on the far side.
 pub const MIN_LIP: f32 = 0.005;
 
 /// Largest angle by which a hanging load swings until it is at rest, in radians. A larger one accepts loads that are held
 /// out lying on their side.
 pub const MAX_SWING: f32 = 0.55;
 
-/// Smallest depth of the centre of mass below what the load hangs by, in metres. With less, a load turns over at a touch.
+/// Smallest depth of the centre of mass below the pivot, in metres. With less, a load turns over at a touch.
 const MIN_DEPTH: f32 = 0.02;
 
 /// Fewest fingers that hold: a load turns about a single one.
@@ -41,13 +41,13 @@ const MIN_FINGERS: usize = 2;
 /// Cosine of the largest angle from the vertical at which a finger's push counts as from below.
 const FROM_BELOW_COS: f32 = 0.6;
 
-/// Weight of the middle of the contacts against their lines of action, in finding what a load hangs by.
+/// Weight of the middle of the contacts against their lines of action in finding the pivot.
 const TOWARD_MIDDLE: f32 = 0.002;
 
 /// How a load hangs in bent fingers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hang {
-    /// What the load swings about, in metres, in the object's frame: the middle of a round bar.
+    /// The pivot of the load's swing, in metres, in the object's frame: the middle of a round bar.
     pub pivot: Vec3,
     /// Height of the way out of the finger that is the easiest to leave, in metres; at least [`MIN_LIP`].
     pub lip: f32,
@@ -91,8 +91,7 @@ impl Hang {
     }
 }
 
-/// Height of the lower of the two ways out of a finger with these links, in metres, under a push to the side of
-/// [`SIDEWAYS_SHARE`]. `None` if it does not push from below.
+/// Height of a finger's lower way out, in metres, under [`SIDEWAYS_SHARE`]; `None` if it does not push from below.
 fn lip(finger: Digit, contacts: &[Contact], links: &[TaperedCapsule; 3], up: Vec3) -> Option<f32> {
     let lifting = Phalanx::ALL.into_iter().filter_map(|phalanx| {
         let part = HandPart::Phalanx(finger, phalanx);

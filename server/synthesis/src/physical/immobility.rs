@@ -51,7 +51,7 @@ pub struct SoftContact {
     pub torsion_radius: f32,
 }
 
-/// What torques are measured by.
+/// Reference point and unit of torques.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueScale {
     /// The point that torques are about, in metres, in the object's frame.
@@ -87,7 +87,7 @@ pub struct Load {
     pub centre_of_mass: Vec3,
     /// Unit vector against gravity, in the object's frame.
     pub up: Vec3,
-    /// What torques are measured by.
+    /// Reference point and unit of torques.
     pub torque_scale: TorqueScale,
 }
 
@@ -104,8 +104,7 @@ pub struct Balance {
     pub friction_use: FrictionUse,
 }
 
-/// How much of friction and torsion the forces may use. [`balance()`] tries these in order until the digits press
-/// firmly. More steps would find safer forces, but cost time whenever the first fail.
+/// How much of friction and torsion the forces may use. [`balance()`] tries these in order until the digits press firmly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FrictionUse {
     /// Less than half, so that twice the load holds too.
@@ -153,7 +152,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
-/// Bisection steps in [`ContactCone::best_push_at_price`], down to a ten-millionth of the friction; the gain changes by less.
+/// Bisection steps in [`ContactCone::best_push_at_price`], down to a ten-millionth of the friction.
 const HALVINGS: usize = 24;
 
 /// A contact's friction limits, prepared for queries. Everything is per newton of normal force.

@@ -1,9 +1,9 @@
-//! `PHYSICAL` validity: grasps that a person would believe.
+//! `PHYSICAL` validity: physically plausible grasps.
 //!
 //! The thesis tests a few line segments; here the hand is solid ([`solids`]) and digits close until their flesh
 //! touches ([`closing`]). The thesis samples force distributions; here contact forces are solved for
 //! ([`immobility`]). A [`grip`] is a hand closed on an object, or fingers in which it hangs ([`hanging`]), clear of
-//! [`barriers`]; [`both_hands`] hold what is too large for one. In [`closer`], digits close, and make way.
+//! [`barriers`]; [`both_hands`] hold objects too large for one. In [`closer`], digits close, and make way.
 
 pub mod barriers;
 pub mod both_hands;

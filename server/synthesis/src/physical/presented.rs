@@ -1,4 +1,4 @@
-//! What a grip is judged in: the object under some friction, and what a holdout adds to it.
+//! The setting in which a grip is judged: the object with its friction, and the rest of its holdout.
 
 use std::sync::Arc;
 
@@ -22,8 +22,7 @@ use crate::{
 /// Smallest Ferrari-Canny epsilon of a valid grasp, without unit, for objects that fingers reach around.
 const MIN_EPSILON: f32 = 0.02;
 
-/// Required share of the best epsilon that a thin part allows: only friction at its radius keeps a rod from rolling,
-/// however it is held.
+/// Required share of the best epsilon that a thin part allows: only friction at its radius keeps a rod from rolling.
 const MIN_SHARE_OF_BEST: f32 = 0.25;
 
 /// An object to be grasped, under the friction between it and the skin.
@@ -59,18 +58,18 @@ impl<'a> ObjectScene<'a> {
     }
 }
 
-/// What a holdout adds to its object: the giver, what else to keep clear of, and the direction of gravity.
+/// The holdout apart from its object: the giver, other barriers, and the direction of gravity.
 #[derive(Clone, Debug)]
 pub struct Presented {
     /// The hands in the object's frame, the giver's first.
     pub hands: Vec<PreparedHand>,
-    /// Those of these hands of which the mesh is known: the others are exact as they are.
+    /// The hands that have a mesh; the others are exact as solids.
     pub meshes: Vec<Arc<HandMesh>>,
     /// Obstacles.
     pub obstacles: Vec<PreparedObstacle>,
     /// Centre of the giver's palm, in metres, in the object's frame.
     pub giver_palm: Option<Vec3>,
-    /// Where the receiver stands.
+    /// The receiver.
     pub receiver: Receiver,
     /// Unit vector against gravity, in the object's frame.
     pub up: Vec3,
@@ -105,7 +104,7 @@ impl Presented {
         }
     }
 
-    /// Nothing but gravity, with `up` the unit vector against it.
+    /// Gravity alone, with `up` the unit vector against it.
     pub fn alone(up: Vec3) -> Self {
         Self {
             hands: Vec::new(),
@@ -117,7 +116,7 @@ impl Presented {
         }
     }
 
-    /// The same, if nothing were to be kept clear of.
+    /// The same without barriers.
     #[must_use]
     pub(crate) fn without_barriers(&self) -> Self {
         Self {
@@ -127,14 +126,14 @@ impl Presented {
         }
     }
 
-    /// The receiver's arm of a hand at the object with this wrist pose; `None` if where the receiver stands is unknown, or if the arm
+    /// The receiver's arm of a hand at the object with this wrist pose; `None` if the receiver's place is unknown, or if the arm
     /// does not reach the wrist clear of object and barriers.
     pub fn arm_of(&self, object: &GraspObject, rig: &Rig, object_from_wrist: Pose) -> Option<ArmPose> {
         self.receiver
             .arm(rig, object_from_wrist, &object.surface, self.barriers())
     }
 
-    /// What a hand keeps clear of.
+    /// The barriers that a hand keeps clear of.
     pub fn barriers(&self) -> Barriers<'_> {
         Barriers {
             hands: &self.hands,

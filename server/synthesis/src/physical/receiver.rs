@@ -23,17 +23,15 @@ use crate::{
 /// Range of the horizontal distance of two shoulders in a handover, in metres.
 const APART: [f32; 2] = [0.65, 1.2];
 
-/// Horizontal distance of the receiver's shoulder from the object at which the elbow is bent by about a right angle, in
-/// metres, and its range, which follows from [`APART`]. Farther away, the arm is stretched.
+/// Comfortable horizontal distance of the receiver's shoulder from the object, in metres, and its range by [`APART`].
 const COMFORTABLE: f32 = 0.42;
 const NEAREST: f32 = 0.25;
 const FARTHEST: f32 = 0.55;
 
-/// How much nearer than comfortable, in metres, a receiver may stand for that to make a difference.
+/// Distance in metres by which a receiver must be nearer than comfortable to be modelled separately.
 const MUCH_NEARER: f32 = 0.05;
 
-/// Angles between the direction opposite the giver and those in which the receiver may stand, in radians: up to 30° to either
-/// side.
+/// Angles of the receiver's possible directions from the one opposite the giver, in radians: up to 30° to either side.
 const ANGLES: [f32; 3] = [0.0, 0.524, -0.524];
 
 /// Number of directions if nothing shows where the giver stands.
@@ -48,25 +46,22 @@ const UPPER_ARM_LEAN: f32 = 0.35;
 /// Range of the shoulder's height above the object, in metres: things are handed over between a hanging hand and the shoulder.
 const HEIGHTS: [f32; 2] = [0.0, 0.6];
 
-/// Distance of the shoulder from the object up to which the arm reaches it without being stretched, in metres: who takes what is
-/// held low comes near.
+/// Distance of the shoulder from the object up to which the arm reaches it without being stretched, in metres.
 const REACH: f32 = 0.6;
 
-/// Distance of the wrist from what the hand holds, in metres.
+/// Distance of the wrist from the held part, in metres.
 const HAND: f32 = 0.1;
 
-/// Cosines of the angle between a straight forearm and the nearest plausible one at which a hand stops to suit at all and suits
-/// best: 75° and 35°. The wrist bends by less than that without strain.
+/// Cosines of the angle between a straight forearm and the nearest plausible one from which a hand suits, and suits best.
 const TOWARD: [f32; 2] = [0.26, 0.82];
 
-/// What [`Receiver::suits`] keeps of its value if no arm reaches the wrist: less than [`SUITABLE`].
+/// Factor on [`Receiver::suits`] if no arm reaches the wrist: less than [`SUITABLE`].
 const OUT_OF_REACH: f32 = 0.45;
 
-/// Cosines of the angle between the forearms of receiver and giver, both from the wrist, at which they are well apart and
-/// would stand in each other: 80° and 60°.
+/// Cosines of the angle between the receiver's and the giver's forearm at which they are well apart, and collide: 80° and 60°.
 const TOGETHER: [f32; 2] = [0.17, 0.5];
 
-/// Smallest value of [`Receiver::suits`] with which a hand passes for one of a person who stands there.
+/// Smallest value of [`Receiver::suits`] of a plausible hand.
 pub const SUITABLE: f32 = 0.5;
 
 /// Where the receiver stands, prepared for many hands. All is in the object's frame.
@@ -83,7 +78,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// A receiver of whom nothing is known and from whom nothing is expected.
+    /// An unknown receiver, which any hand suits.
     pub const ANYWHERE: Self = Self {
         stance: Stance::Any,
         arms: Vec::new(),
@@ -180,7 +175,7 @@ impl Receiver {
         self.directions.push((elbow - wrist).normalize_or(toward));
     }
 
-    /// True if hands are expected to come from somewhere.
+    /// True if the receiver's arms are known or assumed.
     pub fn is_expected(&self) -> bool {
         !self.arms.is_empty()
     }
@@ -190,8 +185,8 @@ impl Receiver {
         matches!(self.stance, Stance::At(_))
     }
 
-    /// How well a hand suits where the receiver stands, 0 to 1: 1 if its forearm, straight behind the wrist, comes from there
-    /// and not from the giver's side; less than [`SUITABLE`] if no plausible arm reaches the wrist. 1 if nothing is expected.
+    /// How well a hand suits the receiver's place, 0 to 1: 1 if its forearm, straight behind the wrist, comes from there
+    /// and not from the giver's side; less than [`SUITABLE`] if no plausible arm reaches the wrist. 1 for an unknown receiver.
     /// Takes about a microsecond.
     pub fn suits(&self, rig: &Rig, object_from_wrist: Pose) -> f32 {
         let suits = self.suits_forearm(object_from_wrist.transform_vector(Vec3::NEG_Y));
@@ -202,7 +197,7 @@ impl Receiver {
         }
     }
 
-    /// How well a forearm's direction from wrist to elbow, a unit vector, suits where the receiver stands: [`Self::suits`] of
+    /// How well a forearm's direction from wrist to elbow, a unit vector, suits the receiver's place: [`Self::suits`] of
     /// a wrist that an arm reaches. Takes some nanoseconds.
     #[inline]
     pub fn suits_forearm(&self, along: Vec3) -> f32 {
@@ -274,17 +269,14 @@ const FLEXED_COS: f32 = 0.819;
 /// Number of swivel angles of the elbow about the line from shoulder to wrist that are tried.
 const SWIVELS: usize = 15;
 
-/// Range of the swivel, from inward to outward, in radians. 0 is the hanging elbow, a right angle an elbow as high as the
-/// shoulder if that is level with the wrist. Of a receiver of whom nothing is known, the elbow hangs.
+/// Range of the swivel, from inward to outward, in radians. 0 is the hanging elbow.
 const SWIVEL_RANGE: [f32; 2] = [-1.75, 1.75];
 const HANGING_RANGE: [f32; 2] = [-0.55, 1.05];
 
-/// How far above the shoulder the elbow may be, as the sine of the upper arm's rise: raising it further takes effort that
-/// nobody spends on taking something. The elbow of an assumed receiver is no higher than the shoulder.
+/// Sine of the upper arm's largest rise above the shoulder. An assumed receiver's elbow is no higher than the shoulder.
 const MAX_RISE: f32 = 0.4;
 
-/// Weight of a swivel of one radian against a wrist at the end of its range: people let the elbow hang, and turn it out before
-/// the wrist is strained.
+/// Weight of a swivel of one radian against a wrist at the end of its range: people turn out the elbow before straining the wrist.
 const SWIVEL_WEIGHT: f32 = 0.35;
 
 /// Radii of an arm at wrist, elbow and shoulder, in metres (ANSUR II: circumferences of 0.17, 0.28 and 0.34 m).
@@ -357,8 +349,7 @@ pub(super) fn elbows(
     })
 }
 
-/// Flexion of a wrist toward the palm and its deviation toward the little finger, in radians, by the direction to the elbow in
-/// the wrist's frame.
+/// Flexion toward the palm and deviation toward the little finger, in radians, of a wrist with the elbow in this direction.
 fn wrist_angles(handedness: Handedness, back: Vec3) -> (f32, f32) {
     (
         f32::atan2(back.z, -back.y),
@@ -371,10 +362,7 @@ fn little(handedness: Handedness, direction: Vec3) -> f32 {
     -handedness.thumb_side() * direction.x
 }
 
-/// The directions in which a forearm may go in the wrist's frame.
-///
-/// Each of flexion and deviation is measured as the other axis shows it, straight from behind, so that both are in range
-/// whichever of them comes first.
+/// The directions that a forearm may take in the wrist's frame, with flexion and deviation each in range.
 #[derive(Clone, Copy)]
 struct WristRange {
     handedness: Handedness,

@@ -25,7 +25,7 @@ const MAX_RESTING_FLEXION: f32 = 1.5 * RESTING_FLEXION;
 pub(super) const TUCKED_FLEXION: f32 = 3.8;
 
 /// The shape an attempt draws: thumb yaw, finger spread, bend ratios, and which digits close. Fingers share one
-/// spread and one bend ratio, as a person's do; drawn one by one, half of the hands have crossing fingers.
+/// spread and one bend ratio; drawn one by one, they would often cross.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandShape {
     /// The thumb's yaw as a share of its range, from 0 to 1.
@@ -45,7 +45,7 @@ pub struct HandShape {
 }
 
 impl HandShape {
-    /// All digits close from opened, each joint alike.
+    /// All digits close from the opened pose, with bend ratios of 1.
     pub(super) const ALL_CLOSE: Self = Self {
         thumb_yaw: 0.5,
         spread: 0.5,

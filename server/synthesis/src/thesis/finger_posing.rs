@@ -449,8 +449,7 @@ fn count_steps(range: AngleRange, step: f32) -> usize {
     (steps.max(1.0)) as usize
 }
 
-/// The touch segment of a link from `joint` in the unit direction `along`: from A = (0, 0, W/2) to B = (0, L, W/2) in the
-/// link's frame.
+/// The touch segment of a link from `joint` in the unit direction `along`: from (0, 0, W/2) to (0, L, W/2) in its frame.
 fn touch_segment(joint: Vec2, along: Vec2, length: f32, diameter: f32) -> PlaneSegment {
     let start = joint + along.perp() * (TOUCH_OFFSET_SHARE * diameter);
     let end = start + along * length;

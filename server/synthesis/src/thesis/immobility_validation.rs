@@ -19,8 +19,7 @@ use crate::{
     },
 };
 
-/// α of Eq. 4.5 in degrees (4.5): largest angle between the summed contact wrench and the one that cancels gravity. A
-/// larger one accepts grasps that hold the object less well.
+/// α of Eq. 4.5 in degrees (4.5): largest angle between the summed contact wrench and the wrench that cancels gravity.
 pub const ACCEPTED_WRENCH_ANGLE_DEGREES: f32 = 5.0;
 
 /// Number of force distributions tried (Algorithms 9 and 14).

@@ -18,8 +18,7 @@ use crate::{
     model::{hand::rig::Rig, holdout::Holdout, object::GraspObject, strategy::Strategy},
 };
 
-/// Margin in metres by which a bound must be violated to prune a placement without computing the measure: well above
-/// rounding error, so that no placement is pruned that the exact measures accept.
+/// Margin in metres by which a bound must be violated to prune a placement: well above rounding error.
 const BOUND_SLACK: f32 = 1e-5;
 
 /// Positions drawn between two checks of the stop signal, which are some microseconds apart.
@@ -153,8 +152,7 @@ impl<'a> WristPlacer<'a> {
         }
     }
 
-    /// The placement in the object's frame, if its measures are in range. Tests run in order of cost: bounds from the box
-    /// come before closest-point queries. `position` is in the frame of B and `box_distance` metres away from it.
+    /// The placement in the object's frame, if its measures are in range; `position` is in the frame of B. Cheap tests come first.
     fn accept(&self, position: Vec3, box_distance: f32, box_from_wrist: Quat) -> Option<WristFrame> {
         let axes = Mat3::from_quat(box_from_wrist);
         let palm = position + axes * self.palm;
@@ -170,8 +168,7 @@ impl<'a> WristPlacer<'a> {
         (self.strategy < Strategy::B || self.is_in_range_of_object(&wrist, box_distance)).then_some(wrist)
     }
 
-    /// True if the palm-CoM-palm angle is below 90°: the ground-plane projections of the two arms then have a positive
-    /// dot product, for which projecting one of them suffices. A zero arm gives 0, which is in range.
+    /// True if the palm-CoM-palm angle is below 90°: the dot product of the arms' ground-plane projections is positive.
     fn is_on_givers_side(&self, palm: Vec3) -> bool {
         self.toward_giver
             .is_some_and(|toward_giver| (palm - self.centre_of_mass).dot(toward_giver) > 0.0)
@@ -225,8 +222,7 @@ impl<'a> WristPlacer<'a> {
 }
 
 impl AngleCosines {
-    /// True if the two wrist angles and their sum are in range, given the components of H' - O along the wrist's +y and +z
-    /// and its length.
+    /// True if both wrist angles and their sum are in range, for the length of H' - O and its components along +y and +z.
     fn admit(&self, upward: f32, forward: f32, length: f32) -> bool {
         if upward < self.upward_max * length
             || forward < self.forward_max * length

@@ -84,7 +84,7 @@ pub struct Joint {
     pub radius: f32,
 }
 
-/// All joints of a hand, in `OpenXR` order and axes. Of a missing finger, they are as in [`Rig`].
+/// All joints of a hand, in `OpenXR` order and axes. Those of a missing finger are as in [`Rig`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandJoints {
     /// Which hand.
@@ -196,18 +196,18 @@ const MAX_THICKNESS_CHANGE: f32 = 1.35;
 /// Shorter lengths count as zero, in metres.
 const MIN_LENGTH: f32 = 1e-4;
 
-/// Where a joint takes the skin that it moves: a point p of its frame in [`Skin::bind_frames`] goes to `pose * (scale * p)`.
+/// The transform of a joint's skin: a point p of the joint's frame in [`Skin::bind_frames`] goes to `pose * (scale * p)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkinJoint {
     /// The joint's frame, with -Z along its bone.
     pub pose: Pose,
-    /// How much longer and thicker the bone is than in the bind pose, along the frame's axes; 0 for a finger that is missing.
+    /// Size of the bone relative to the bind pose along the frame's axes; 0 for a missing finger.
     pub scale: Vec3,
 }
 
 impl Skin {
     /// The vertex positions for joints at `joints`, in their frame and in metres. Where bones are longer or thicker
-    /// than in the bind pose, the skin stretches along and across each bone. That of a missing finger shrinks to its knuckle.
+    /// than in the bind pose, the skin stretches along and across each bone. A missing finger's skin shrinks to its knuckle.
     pub fn posed(&self, joints: &HandJoints) -> Vec<Vec3> {
         let (skin_joints, bind_frames) = (self.joints_at(joints), self.bind_frames());
         let matrices: [Affine3A; JOINT_COUNT] = std::array::from_fn(|joint| {
@@ -230,7 +230,7 @@ impl Skin {
             .collect()
     }
 
-    /// What moves the skin for joints at `joints`, in their frame. Linear blend skinning with these gives [`Skin::posed`].
+    /// The bone transforms for joints at `joints`, in their frame. Linear blend skinning with these gives [`Skin::posed`].
     pub fn joints_at(&self, joints: &HandJoints) -> [SkinJoint; JOINT_COUNT] {
         let size = ratio(hand_length(joints), hand_length(&self.bind));
         std::array::from_fn(|joint| SkinJoint {
@@ -245,8 +245,7 @@ impl Skin {
     }
 }
 
-/// The scale of a joint's skin across (x, y) and along (z) its bone, from the bind pose to `target`. `size` is the
-/// ratio of the hands' lengths.
+/// The scale of a joint's skin across (x, y) and along (z) its bone; `size` is the ratio of the hands' lengths.
 fn joint_scale(bind: &HandJoints, target: &HandJoints, joint: usize, size: f32) -> Vec3 {
     let along = ratio(bone(target, joint).length(), bone(bind, joint).length());
     if joint == index::WRIST || joint == index::PALM {
@@ -264,8 +263,7 @@ fn joint_scale(bind: &HandJoints, target: &HandJoints, joint: usize, size: f32) 
     Vec3::new(across, across, along)
 }
 
-/// A joint's frame after the smallest rotation that aligns its -Z axis with its bone. Trackers report metacarpals up to 15
-/// degrees off their bones, which would tear the fingers off the palm.
+/// A joint's frame with its -Z axis aligned with its bone: trackers report metacarpals up to 15° off.
 fn bone_frame(hand: &HandJoints, joint: usize) -> Pose {
     let Pose {
         position,
@@ -290,8 +288,7 @@ fn hand_length(hand: &HandJoints) -> f32 {
     bone(hand, index::WRIST).length()
 }
 
-/// The bone of a joint as a vector, in metres. Tips share the distal bone; wrist and palm use the line from the wrist
-/// to the middle knuckle.
+/// The bone of a joint, in metres. Tips share the distal bone; wrist and palm use the line from wrist to middle knuckle.
 fn bone(hand: &HandJoints, joint: usize) -> Vec3 {
     let (from, to) = match joint {
         index::PALM | index::WRIST => (index::WRIST, index::FIRST_OF_DIGIT[2] + 1),

@@ -100,7 +100,7 @@ pub fn hand_frames(rig: &Rig, pose: &HandPose) -> HandFrames {
     }
 }
 
-/// Rounds over the angles of a digit. The sum of squares falls in each; tracked poses settle within some tens.
+/// Limit on the rounds over a digit's angles. Tracked poses settle within some tens.
 const ROUNDS: usize = 200;
 
 /// A round that turns no angle by more, in radians, is the last.
@@ -168,8 +168,7 @@ fn ends(digit: &DigitRig, wrist: Pose, angles: &DigitAngles) -> [Vec3; 3] {
     ends
 }
 
-/// The turn about an axis through a point that brings points nearest to their targets: with u the part of a point across the axis
-/// and v that of its target, it maximises the sum of u·v cos φ + axis·(u × v) sin φ.
+/// The turn about an axis that brings points nearest to their targets: it maximises Σ u·v cos φ + axis·(u × v) sin φ.
 fn turn(centre: Vec3, axis: Vec3, points: impl Iterator<Item = (Vec3, Vec3)>) -> f32 {
     let (sin, cos) = points.fold((0.0, 0.0), |(sin, cos), (point, target)| {
         let across = |p: Vec3| (p - centre).reject_from(axis);

@@ -29,7 +29,7 @@ impl Handedness {
         }
     }
 
-    /// The sense of the wrist's x axis in which the thumb is: 1 of a right hand, -1 of a left one.
+    /// Sign of the wrist's x axis toward the thumb: 1 for the right hand, -1 for the left.
     pub(crate) const fn thumb_side(self) -> f32 {
         match self {
             Self::Left => -1.0,

@@ -45,7 +45,7 @@ pub struct DigitLimits<T = AngleRange> {
 }
 
 impl<T: Copy> DigitLimits<T> {
-    /// Those of yaw and pitches, from the base outward.
+    /// Limits of yaw and pitches, from the base outward.
     pub(crate) fn to_array(self) -> [T; 4] {
         [
             self.base_yaw,
@@ -109,12 +109,12 @@ impl RestOverlaps {
         self.0.as_flattened()[link][part]
     }
 
-    /// Those of a digit's links.
+    /// Depths of a digit's links.
     pub fn of_digit(&self, digit: Digit) -> &[LinkOverlaps; 3] {
         &self.0[digit.index()]
     }
 
-    /// Makes a depth at least as large as this one.
+    /// Raises a depth to at least this one.
     pub(crate) fn deepen(&mut self, link: usize, part: usize, depth: f32) {
         let links = self.0.as_flattened_mut();
         let deepest = links[link][part].max(depth);
@@ -129,7 +129,7 @@ impl RestOverlaps {
         self.0.as_flattened().as_flattened()
     }
 
-    /// Of a hand that is `scale` times as large.
+    /// The values of a hand that is `scale` times as large.
     fn scaled(&self, scale: f32) -> Self {
         Self(
             self.0
@@ -141,8 +141,7 @@ impl RestOverlaps {
 /// Number of solids of the palm and the ball of the thumb.
 pub const FLESH_SOLIDS: usize = 14;
 
-/// How the flesh of a palm differs from that of the built-in hands at the same size: for the start and the end of each of its
-/// solids, how much farther they are out of the palm, and how much larger their radius is, in metres.
+/// Deviation of a palm's flesh from that of the built-in hands at the same size, at the start and the end of each solid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PalmFlesh(pub [[EndChange; 2]; FLESH_SOLIDS]);
 
@@ -161,7 +160,7 @@ impl PalmFlesh {
         self.0.iter().flatten().flat_map(|end| [end.offset, end.radius])
     }
 
-    /// Of a hand that is `scale` times as large.
+    /// The values of a hand that is `scale` times as large.
     fn scaled(&self, scale: f32) -> Self {
         let scaled = |end: EndChange| EndChange {
             offset: scale * end.offset,
@@ -173,8 +172,8 @@ impl PalmFlesh {
 
 /// A hand's rig, in the wrist frame: +y along the stretched fingers, +z out of the palm.
 ///
-/// Of the four fingers, a hand may lack two. The tip of a missing finger has no radius, and its links have no length: all its
-/// joints but the metacarpal are at its knuckle, which, like the metacarpal, still shapes the palm.
+/// A hand may lack up to two fingers. The tip of a missing finger has no radius, and its links have no length: all its
+/// joints but the metacarpal are at its knuckle, which, like the metacarpal, shapes the palm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// "thesis", "adult" or a custom name.
@@ -196,7 +195,7 @@ pub struct Rig {
     /// tracking data; their radius is that of the rounded fingertip, so a capsule around the last phalanx must end
     /// one radius before the tip.
     pub joint_radii: [f32; 26],
-    /// What may overlap, of rigs made from other hands; `None` for those whose parts are clear of each other at rest.
+    /// Overlaps at rest of rigs made from other hands; `None` for rigs whose parts are clear of each other at rest.
     pub rest_overlaps: Option<Box<RestOverlaps>>,
     /// The flesh of its palm, if that was measured.
     pub palm_flesh: Option<Box<PalmFlesh>>,
@@ -218,8 +217,8 @@ impl Rig {
         Digit::ALL[1..].iter().copied().filter(|&finger| self.has(finger))
     }
 
-    /// The digits with which the hand does what these digits of a hand with four fingers do: as many fingers, if it has them,
-    /// those next to the thumb.
+    /// The digits that stand in for these digits of a hand with four fingers: as many fingers, if it has them, those next to the
+    /// thumb.
     #[must_use]
     pub fn own_digits(&self, digits: [bool; 5]) -> [bool; 5] {
         let [thumb, fingers @ ..] = digits;
@@ -231,7 +230,7 @@ impl Rig {
         own
     }
 
-    /// Its numbers as little-endian bytes: everything but the name, which does not affect grips. Equal rigs have equal bytes.
+    /// All but the name, which does not affect grips, as little-endian bytes. Equal rigs have equal bytes.
     pub fn content(&self) -> Vec<u8> {
         let mut numbers: Vec<f32> = Vec::with_capacity(256);
         numbers.extend(self.palm.to_array());

@@ -1,4 +1,4 @@
-//! Hands that somebody posed: closed or opened as little as it takes to touch, or as they are.
+//! Posed hands: closed or opened as little as it takes to touch, or unchanged.
 
 use super::{Grip, Gripper, MAX_PENETRATION, collect_contacts, collides_without_digits, soften};
 use crate::{
@@ -21,24 +21,24 @@ use crate::{
 /// Fewest contacts that hold anything.
 pub const FEWEST_CONTACTS: usize = 2;
 
-/// What becomes of the digits of a posed hand.
+/// Treatment of a posed hand's digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PosedDigits {
-    /// Every digit stops at the first touch on the way from its pose, or less bent if that is inside something, to a slightly more
-    /// bent one; one that touches nothing keeps its pose.
+    /// Every digit bends slightly from its pose, or from a less bent one if that is inside something, up to its first touch. A
+    /// digit that touches nothing keeps its pose.
     Settled,
-    /// They stay.
+    /// They keep their poses.
     Still,
 }
 
-/// Why a posed hand cannot be a grip, whatever the friction and however the object is held out.
+/// Why a posed hand cannot be a grip under any friction and in any holdout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Misfit {
-    /// Palm or forearm are so deep in the object, in metres.
+    /// Palm or forearm are this deep in the object, in metres.
     Palm(f32),
     /// A digit is inside the object or another part of the hand, however it bends.
     Digits,
-    /// No more than so many parts of the hand touch.
+    /// Only this many parts of the hand touch.
     Contacts(usize),
 }
 
@@ -130,7 +130,7 @@ impl Gripper {
     }
 }
 
-/// The digits as they are, thumb first; missing ones do not touch.
+/// The digits in their poses, thumb first; missing ones do not touch.
 fn as_posed(scene: &ObjectScene<'_>, rig: &Rig, pose: &HandPose, solids: &HandSolids) -> [ClosedDigit; 5] {
     let mut digits = [ClosedDigit::default(); 5];
     for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
@@ -141,7 +141,7 @@ fn as_posed(scene: &ObjectScene<'_>, rig: &Rig, pose: &HandPose, solids: &HandSo
     digits
 }
 
-/// The shape of the hand, as far as its grip keeps one: how much the second joints bend per degree of the first.
+/// The shape of the hand that its grip keeps: the bend ratios.
 pub(super) fn shape_of(pose: &HandPose) -> HandShape {
     let ratio = |digit: Digit| {
         let DigitAngles {
@@ -168,11 +168,11 @@ pub struct PosedHold {
     pub touching: [bool; 5],
     /// Ferrari-Canny epsilon of the contacts.
     pub epsilon: f32,
-    /// The least that is required of it; `None` if the object hangs in the fingers.
+    /// The required epsilon; `None` if the object hangs in the fingers.
     pub required: Option<f32>,
     /// True if the contacts have closure, or if the object hangs in the fingers.
     pub is_enclosed: bool,
-    /// The epsilon as a multiple of the required one; of what hangs, the height of the way out.
+    /// The epsilon, or the height of the way out for a hanging object, as a multiple of the required value.
     pub relative_closure: f32,
     /// Forces that balance the weight, or nearly do.
     pub balance: Balance,
@@ -191,8 +191,8 @@ impl PosedHold {
 }
 
 impl Gripper {
-    /// How a posed hand holds the object, whatever it collides with; its contacts are in `contacts` afterwards. A load hangs in
-    /// fingers only without the thumb, as in grips that search finds, and if its contacts and their forces are such that it may.
+    /// How a posed hand holds the object, regardless of collisions; its contacts are in `contacts` afterwards. A load hangs only in
+    /// fingers without the thumb, as in the grips of a search, and only if contacts and forces allow it.
     pub fn hold_as_posed(
         &mut self,
         scene: &ObjectScene<'_>,
@@ -218,7 +218,7 @@ impl Gripper {
             return hanging.clone();
         }
         let alone = self.alone(scene, touching, presented);
-        // If neither holds, the way of holding that the hand has the shape for is more telling.
+        // If neither holds, report the hold that the hand is shaped for.
         hanging.filter(|_| !alone.holds()).unwrap_or(alone)
     }
 
@@ -228,7 +228,7 @@ impl Gripper {
         let load = scene.load(&self.soft_contacts, presented.up);
         let required = scene.required_epsilon(&load.torque_scale);
         let closure = self.opposed_closure(scene);
-        // A rejected hand's figure is only some number below the required one.
+        // For a rejected hand, this is only some number below the required epsilon.
         let exact = closure.unwrap_or_else(|| epsilon(&self.soft_contacts, &load, 0.0, &mut self.buffers));
         PosedHold {
             touching,

@@ -16,8 +16,7 @@ pub const MAX_CONTACT_FORCE: f32 = 27.0;
 /// fall in simulation. Smaller values reject more grasps.
 pub const BALANCE_TOLERANCE: f32 = 0.02;
 
-/// Firm sum of the digits' normal forces times friction, over the weight. Two opposed digits need at least 1; people
-/// keep a margin (Westling and Johansson 1984), and a released object may be pushed.
+/// Firm sum of the digits' normal forces times friction, over the weight, with a margin (Westling and Johansson 1984).
 const FIRMNESS: f64 = 5.0;
 
 /// Part of the firm force that does not depend on the weight, in newtons: even a 20 g scalpel is held as firmly as a pen.
@@ -26,8 +25,7 @@ const BASE_GRIP_FORCE: f64 = 8.0;
 /// The firm sum puts no digit beyond this share of [`MAX_CONTACT_FORCE`]: people do not grip at full strength.
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
-/// Usable shares of friction and torsion, by [`FrictionUse`]: twice the load does not slip either, one and a half times the load
-/// holds, and all, less what rounding to single precision may add.
+/// Usable shares of friction and torsion, by [`FrictionUse`]: twice the load holds, 1.5 times the load holds, and all but rounding.
 const SHARES: [f64; 3] = [0.45, 0.7, 1.0 - 2e-6];
 
 /// Digits press firmly from this share of the firm sum.
@@ -39,17 +37,16 @@ const SHARE_WEIGHT: f64 = 0.04;
 /// Weight of missing firmness (as a share of the firm sum) against unbalanced wrench.
 const FIRMNESS_WEIGHT: f64 = 0.04;
 
-/// Weight of a contact's force limit against unbalanced wrench: force beyond the limit costs about a thousand times as much.
+/// Weight of a contact's force limit against unbalanced wrench.
 const LIMIT_WEIGHT: f64 = 30.0;
 
 /// The search for any balance ends once the residual is below this share of [`BALANCE_TOLERANCE`].
 const FOUND: f64 = 0.5;
 
-/// A push that gains less than this along the residual no longer helps to balance.
+/// A push that gains less than this along the residual does not improve balance.
 const NEGLIGIBLE_GAIN: f64 = 1e-6;
 
-/// A push that gains less than this share of what the first newton gains for firmness does not improve comfort: sums
-/// and shares that differ by some percent are equally comfortable. Smaller values take longer.
+/// A push that gains less than this share of the first newton's gain in firmness does not improve comfort.
 const NEGLIGIBLE_COMFORT: f64 = 0.01;
 
 /// Limit on the columns added per solve. Most grasps need a dozen.
@@ -86,8 +83,7 @@ pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> 
     balance_with(contacts, load, FrictionUse::Low, buffers)
 }
 
-/// [`balance`] starting from `least_use`, for contacts known not to press firmly with less friction under a similar
-/// load. It takes half the time of finding that out.
+/// [`balance`] starting from `least_use`, for contacts known not to press firmly with less friction under a similar load.
 ///
 /// # Panics
 /// As [`balance`].
@@ -101,12 +97,12 @@ pub fn balance_with(
     (found.residual <= BALANCE_TOLERANCE).then_some(found)
 }
 
-/// [`balance`] or, if there is none, what comes close to it, with what it leaves unbalanced; takes longer.
+/// [`balance`] or, if it fails, the forces closest to balance, with their residual; takes longer.
 pub(crate) fn nearest_balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Balance {
     solved(contacts, load, (FrictionUse::Low, false), buffers)
 }
 
-/// The best forces found; without balance, the search may give up once that is certain.
+/// The best forces found; the search may give up once balance is impossible.
 fn solved(
     contacts: &[SoftContact],
     load: &Load,
@@ -196,8 +192,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The comfortable balance that is firm with the least friction use, starting at `least_use`; otherwise the
-    /// firmest one found.
+    /// The comfortable balance that is firm with the least friction use from `least_use` on, or else the firmest.
     fn lowest_friction_balance(&mut self, least_use: FrictionUse, solvers: &mut Solvers) -> Option<Balance> {
         let mut firmest: Option<(f64, Balance)> = None;
         for friction_use in FrictionUse::ALL {

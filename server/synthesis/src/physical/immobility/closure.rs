@@ -45,9 +45,7 @@ pub fn epsilon_upper_bound(contacts: &[SoftContact], load: &Load, buffers: &mut 
     least_resisted(prepared_cones(contacts, load, &mut buffers.cones)) as f32
 }
 
-/// An upper bound of epsilon, 0 if there is certainly no closure. Gilbert's algorithm (1966) walks to the point of
-/// the hull nearest to the origin; while the origin is outside or near the surface, its directions are those that the
-/// contacts resist least.
+/// An upper bound of epsilon, 0 without closure, by Gilbert's walk (1966) to the hull's point nearest to the origin.
 fn least_resisted(cones: &[ContactCone]) -> f64 {
     let mut point: ScaledWrench = [0.0; 6];
     for cone in cones {
@@ -77,8 +75,7 @@ fn least_resisted(cones: &[ContactCone]) -> f64 {
     upper
 }
 
-/// Epsilon from below. The polytope's facet nearest to the origin gives a lower bound, the reach of the contacts
-/// along its normal an upper one; the wrench with that reach becomes a new vertex, until the bounds meet.
+/// Epsilon from below: the polytope grows at its facet nearest to the origin until lower and upper bound meet.
 fn inscribed_sphere(cones: &[ContactCone], upper: f64, required: f64, polytope: &mut Polytope) -> f64 {
     if !polytope.start(|direction| farthest_wrench(cones, direction)) {
         return 0.0;
@@ -143,8 +140,7 @@ pub(super) struct Polytope {
 }
 
 impl Polytope {
-    /// Starts with a simplex of seven points, support points that `farthest` returns for seven directions. Returns
-    /// false if all points lie in a hyperplane.
+    /// Starts with a simplex of seven support points from `farthest`; false if all points lie in a hyperplane.
     fn start(&mut self, farthest: impl Fn(&ScaledWrench) -> (f64, ScaledWrench)) -> bool {
         let mut corners = [[0.0; DIMENSIONS]; DIMENSIONS + 1];
         corners[0] = farthest(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).1;
@@ -208,8 +204,7 @@ impl Polytope {
         (self.facets[facet as usize].normal, self.offsets[facet as usize])
     }
 
-    /// Adds a vertex outside `facet`. Returns false if it is not outside, or if rounding has broken the surface,
-    /// after which the polytope must not be used.
+    /// Adds a vertex outside `facet`; false if it is not outside, or if rounding has broken the polytope.
     fn expand(&mut self, facet: u32, vertex: ScaledWrench) -> bool {
         let height = dot(&self.facets[facet as usize].normal, &vertex) - self.offsets[facet as usize];
         if height <= OUTSIDE {
@@ -290,9 +285,8 @@ impl Polytope {
         }
     }
 
-    /// Links a new facet to its neighbours among the new ones. For each shared ridge, walks around its four vertices
-    /// other than the newest, through removed facets, to the end of that fan. `None` if the fan does not end, which
-    /// means that rounding has broken the surface.
+    /// Links a new facet to its new neighbours: walks through the removed facets around each shared ridge. `None` if a walk
+    /// does not end because rounding has broken the surface.
     fn link(&mut self, index: u32, replaced: u32) -> Option<()> {
         let newest = (self.vertices - 1) as u16;
         let at_newest = position(&self.facets[index as usize].vertices, newest)?;
@@ -365,8 +359,7 @@ fn perpendicular(basis: &[ScaledWrench]) -> ScaledWrench {
     orthonormalised(axis, basis)
 }
 
-/// Gradient and constant of each barycentric coordinate: the columns of the inverse of the matrix whose rows are the
-/// corners followed by a 1, by Gauss-Jordan elimination with row pivoting. `None` if it is singular.
+/// Gradient and constant of each barycentric coordinate, by Gauss-Jordan elimination; `None` for a flat simplex.
 fn barycentric_coordinates(
     corners: &[ScaledWrench; DIMENSIONS + 1],
 ) -> Option<[(ScaledWrench, f64); DIMENSIONS + 1]> {

@@ -14,11 +14,10 @@ use super::UnitPush;
 /// A column depends on the others if its orthogonal part has less than this share of its squared length.
 const DEPENDENT_SHARE: f64 = 1e-11;
 
-/// Below this share, rounding leaves too much of the other directions in the orthogonal part, so the projection is
-/// repeated once ("twice is enough": Parlett 1980, section 6-9, after Kahan). Larger values repeat in vain.
+/// Below this share, the projection is repeated once against rounding ("twice is enough": Parlett 1980, section 6-9).
 const REPEATED_SHARE: f64 = 1e-4;
 
-/// What a column stands for.
+/// Meaning of a column.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Column {
     /// A push of a contact.
@@ -44,7 +43,7 @@ pub(super) struct ConicLeastSquares<const FOURS: usize> {
     rows: usize,
     /// The passive set.
     columns: Vec<Column>,
-    /// As many as there are columns, in no related order.
+    /// As many as columns, in any order.
     directions: Vec<Direction<FOURS>>,
     solution: Solution<FOURS>,
 }
@@ -138,8 +137,7 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         true
     }
 
-    /// The column whose weight vanishes first on the way to another solution, and at which share of that way; `None`
-    /// if all weights stay positive.
+    /// The column whose weight vanishes first on the way to another solution, and the share of that way; `None` without one.
     fn first_to_vanish(&self, free: &Solution<FOURS>) -> Option<(usize, f64)> {
         let weights = self.solution.weights.as_flattened().iter();
         let pairs = weights.zip(free.weights.as_flattened());
@@ -177,11 +175,9 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         }
     }
 
-    /// Reflects the directions so that only one contains a column, and removes that one. Returns the column's share
-    /// in it and the direction; `None` if there are no directions.
+    /// Reflects the directions so that only one contains a column, and removes it. Returns the column's share and the direction.
     fn isolate_direction(&mut self, column: usize) -> Option<(f64, Direction<FOURS>)> {
-        // The Householder reflection that moves the column's whole row of T into its last entry. Of the two that do,
-        // the one without cancellation.
+        // The Householder reflection without cancellation that moves the column's whole row of T into its last entry.
         let mut normal = zeros::<FOURS>();
         for (place, direction) in normal.as_flattened_mut().iter_mut().zip(&self.directions) {
             *place = direction.weights.as_flattened()[column];

@@ -20,12 +20,11 @@ use crate::{
 /// visibly overlap, smaller ones reject ordinary closed hands.
 pub const SOFT_CONTACT: f32 = 0.002;
 
-/// Upper bound on the radius of a finger's first phalanx at the knuckle over that at its far joint, where neighbours
-/// are compared: a knuckle's radius includes flesh of the palm that neighbours share.
+/// Bound on the ratio of a first phalanx's radii: the tracked radius of a knuckle includes flesh that neighbours share.
 const KNUCKLE_TAPER: f32 = 1.03;
 
-/// The smallest distance in metres between parts of a rig's hand that can meet, plus what soft flesh allows
-/// ([`SOFT_CONTACT`]) and what they overlap at rest: negative if one goes through another, [`SOFT_CONTACT`] if none touch.
+/// The smallest distance in metres between parts of a rig's hand that can meet, plus [`SOFT_CONTACT`], which soft flesh allows,
+/// and their overlap at rest: negative if a part goes through another, [`SOFT_CONTACT`] if none touch.
 ///
 /// The parts that can meet are the links of different digits, the two outer links of a digit and the palm, and, for
 /// fingers, the ball of the thumb. Inner links and the thumb's ball overlap the palm in every pose.
@@ -42,7 +41,7 @@ pub fn self_clearance(rig: &Rig, hand: &HandSolids) -> f32 {
 /// The two parts of a hand that can meet and come closest.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NearestParts {
-    /// [`self_clearance`] of them, however far apart they are.
+    /// [`self_clearance`] of them, at any distance.
     pub clearance: f32,
     /// How deep they overlap at rest, in metres.
     pub rest_overlap: f32,
@@ -51,7 +50,7 @@ pub(crate) struct NearestParts {
 }
 
 impl NearestParts {
-    /// Of a rig's hand; `None` if no parts can meet.
+    /// The closest parts of a rig's hand; `None` if no parts can meet.
     pub(crate) fn of(rig: &Rig, hand: &HandSolids) -> Option<Self> {
         let overlap = |link, part| {
             let overlaps = rig.rest_overlaps.as_deref();
@@ -70,7 +69,7 @@ impl NearestParts {
     }
 }
 
-/// How deep the parts of a rig's hand overlap in some poses, each pair as deep as where it is deepest; `None` if none do.
+/// The largest overlap of each pair of a rig's parts in some poses; `None` if no parts overlap.
 pub fn rest_overlaps(rig: &Rig, poses: &[HandPose]) -> Option<Box<RestOverlaps>> {
     let mut overlaps = RestOverlaps::default();
     for pose in poses {
@@ -143,8 +142,7 @@ impl Parts {
         }
     }
 
-    /// The smallest distance between parts that can meet, plus what they overlap at rest, or `enough` if it is larger. Each pair
-    /// that is closer than all before it is passed to `nearer`.
+    /// The smallest distance between parts that can meet plus overlap at rest, up to `enough`; `nearer` receives each closer pair.
     #[inline]
     fn least_distance(
         &self,
@@ -194,8 +192,7 @@ impl Bounded {
         by_spheres.max(by_axis)
     }
 
-    /// True if the other is certainly farther away than `distance`: by the bounding spheres, then by one sphere and
-    /// the longer solid's axis, because the sphere around a forearm is wide.
+    /// True if the other is certainly farther away than `distance`, by the bounding spheres and the longer solid's axis.
     pub(in crate::physical) fn is_beyond(&self, other: &Self, distance: f32) -> bool {
         let reach = distance + self.radius + other.radius;
         if reach < 0.0 || self.centre.distance_squared(other.centre) > reach * reach {
@@ -265,9 +262,7 @@ pub fn closest(capsule: &TaperedCapsule, surface: &MeshBvh, within: f32) -> Opti
     nearest
 }
 
-/// Finds the deepest point of the axis in the volume by branch and bound on an interval of it: depth changes by no
-/// more than the distance along the axis, the radius by its slope. The surface is within `reach` metres of the
-/// interval's middle.
+/// Finds the deepest point of an axis interval by branch and bound; the surface is within `reach` metres of its middle.
 fn deepen(
     capsule: &TaperedCapsule,
     surface: &MeshBvh,

@@ -263,8 +263,7 @@ pub(super) const METACARPAL_ENDS: usize = 8;
 const WRIST: usize = METACARPAL_ENDS;
 const THUMB: usize = WRIST + 1;
 
-/// Bones by their joints in [`TrackedPalm::joints`]: the metacarpals, the lines between neighbouring bases, those between
-/// neighbouring knuckles, and those from the wrist to all bases.
+/// Bones by their joints: metacarpals, lines between neighbouring bases and knuckles, and from the wrist to all bases.
 #[rustfmt::skip]
 const BONES: [[usize; 2]; 15] = [
     [0, 1], [2, 3], [4, 5], [6, 7],
@@ -279,8 +278,7 @@ pub(super) const AROUND_METACARPALS: usize = 8;
 /// The joints that are fixed in the palm, each with its distance to the skin.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackedPalm {
-    /// Base and knuckle of each metacarpal from index to little finger, the wrist, and the base of the thumb:
-    /// positions and radii in metres.
+    /// Position and radius in metres of each finger's metacarpal base and knuckle, the wrist, and the thumb's base.
     joints: [(Vec3, f32); THUMB + 1],
 }
 

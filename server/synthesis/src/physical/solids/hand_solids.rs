@@ -24,19 +24,17 @@ pub(crate) const FOREARM_SOLIDS: usize = 2;
 /// Modelled length of the forearm behind the wrist, in metres: up to the elbow of an adult.
 pub(in crate::physical) const FOREARM_LENGTH: f32 = 0.25;
 
-/// Half the thickness of the forearm at wrist and far end, as multiples of the wrist's tracked radius (half its
-/// thickness at the crease). The far end has a circumference of 0.30 m for 0.17 m at the wrist, the means of ANSUR II.
+/// Half the thickness of the forearm at wrist and far end over the wrist's tracked radius (circumferences of ANSUR II).
 const FOREARM_RADII: [f32; 2] = [0.95, 2.3];
 
-/// Distance of the two solids from the forearm's axis at wrist and far end, in the same unit: a wrist is 1.65 times
-/// as broad as thick, a forearm 1.4 times.
+/// Distance of the two solids from the forearm's axis at wrist and far end, in the same unit.
 const FOREARM_SIDES: [f32; 2] = [0.65, 0.85];
 
 /// The solids of a posed hand and its forearm, in the frame of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandSolids {
-    /// The three links of each digit, thumb first. The thumb's first link is its metacarpal. Those of a missing digit are a
-    /// point within the palm, which therefore decides first.
+    /// The three links of each digit, thumb first. The thumb's first link is its metacarpal. Links of a missing digit are a
+    /// point within the palm, so they never decide.
     pub phalanges: [[TaperedCapsule; 3]; 5],
     /// The part of the palm that moves with the wrist.
     pub palm: [TaperedCapsule; PALM_SOLIDS],
@@ -170,7 +168,7 @@ pub(crate) fn link_radii(rig: &Rig, digit: Digit) -> [f32; 4] {
 }
 
 /// The links of a digit with joints and tip at `points` and distances `radii` from there to the skin. The tip lies on
-/// the skin, so the last link's sphere ends there. Those of a missing digit are a point within the palm.
+/// the skin, so the last link's sphere ends there. Links of a missing digit are a point within the palm.
 pub fn link_solids(points: [Vec3; 4], radii: [f32; 4]) -> [TaperedCapsule; 3] {
     if radii[3] <= 0.0 {
         return [TaperedCapsule::new(points[0], points[0], 0.0, 0.0); 3];
@@ -213,8 +211,7 @@ pub const TRACKED_SOLIDS: usize = AROUND_METACARPALS + 1;
 pub struct TrackedSolids {
     /// The hand as it is compared with an object.
     pub hand: HandSolids,
-    /// Its palm, along the metacarpals at least as thick as tracked. Four separate solids instead would no longer fit
-    /// into the same number of registers.
+    /// Its palm, along the metacarpals at least as thick as tracked.
     pub palm: [TaperedCapsule; PALM_SOLIDS],
     /// The other tracked parts: across the knuckles, from the wrist to all metacarpal bases, and the middle of the
     /// forearm.

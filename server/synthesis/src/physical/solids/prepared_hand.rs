@@ -60,7 +60,7 @@ impl PreparedHand {
         Self::of(&COLLISION_ORDER.map(|solid| Bounded::new(all[solid])))
     }
 
-    /// What is certainly inside a mesh: distances from it are upper bounds of those from the mesh.
+    /// Prepares balls inside a mesh: distances from them are upper bounds of those from the mesh.
     pub(crate) fn inside(mesh: &HandMesh) -> Self {
         // Without volume, a point of the surface.
         let point = mesh.surface.mesh().corners(0)[0];
@@ -215,10 +215,8 @@ impl PreparedHand {
         Some(least)
     }
 
-    /// Lower bounds, in metres, on the distance of a group of the solids from another one.
-    ///
-    /// Along any direction, the gap between the projections of two convex solids is such a bound. The direction
-    /// between nearly nearest points of their axes makes it nearly tight.
+    /// Lower bounds, in metres, on the distance of a group of the solids from another one: gaps between their projections along
+    /// the direction between nearly nearest points of the axes.
     #[inline]
     fn distance_lower_bounds(&self, our: &TaperedCapsule, group: usize) -> [f32; GROUP] {
         let of = |lanes: &Lanes| lanes.as_chunks::<GROUP>().0[group];
