@@ -107,7 +107,7 @@ impl BuiltInHoldout {
         }
     }
 
-    /// The object, with what proposals derive from it.
+    /// The object, with the data that proposals derive from it.
     ///
     /// # Panics
     /// The holdout names an object that is not built in; none of [`holdouts`] does.

@@ -18,7 +18,7 @@ pub struct BuiltInObject {
     pub manifest: &'static str,
     /// The object as searches use it.
     pub object: Arc<GraspObject>,
-    /// The same, with what proposals derive from it.
+    /// The same, with the data that proposals derive from it.
     pub prepared: Arc<PreparedObject>,
 }
 

@@ -225,7 +225,7 @@ fn givers_touch_with_two_digits_without_sinking_in() {
     }
 }
 
-/// What is known of an object: name, mass in kg and triangles in Table 5.1 of the thesis; least and greatest size along x, y, z in
+/// Known data of an object: name, mass in kg and triangles in Table 5.1 of the thesis; least and greatest size along x, y, z in
 /// mm; least and greatest volume in cm³. Steel has 7.9 g/cm³, so 50 g of scissors are 6.3 cm³ and 20 g of scalpel 2.5 cm³; a remote
 /// of 130 g is mostly air and plastic of about 1 g/cm³ on the whole.
 struct About {

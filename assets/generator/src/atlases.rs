@@ -177,7 +177,7 @@ fn grow(object: &PreparedObject, rig: &PreparedRig, bar: &ProgressBar) -> Grown 
     growth.grown()
 }
 
-/// Compares an excerpt with what would be made now.
+/// Compares an excerpt with a new one.
 fn compare(bytes: &[u8], object: &PreparedObject, rig: &PreparedRig) -> Result<(), Difference> {
     let shipped = decode(bytes, object, rig)?;
     if shipped.atlas.is_complete() || shipped.proposed > 0 || shipped.atlas.entries().is_empty() {
@@ -226,7 +226,7 @@ mod tests {
 
     use super::*;
 
-    /// What grows until there are so many grips.
+    /// Grows until there are so many grips.
     fn grown(entries: usize, object: &PreparedObject, rig: &PreparedRig) -> Grown {
         let mut growth = Growth::new(object, rig);
         let mut gripper = Gripper::default();

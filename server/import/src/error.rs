@@ -15,7 +15,7 @@ pub enum ImportError {
     At {
         /// The part of the file.
         place: String,
-        /// What is wrong with it, and what would be right.
+        /// Why it is wrong, and a correct alternative.
         what: String,
     },
     /// Something is wrong with the file as a whole.

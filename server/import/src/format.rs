@@ -1,4 +1,4 @@
-//! Recognises the format of a mesh by its content, and what bytes are that are no mesh.
+//! Recognises the format of a mesh by its content, or that of bytes that are no mesh.
 
 use crate::{
     error::ImportError,
@@ -46,7 +46,7 @@ impl Format {
     }
 }
 
-/// Starts of files that cannot be read, in lower case, and what they are. The first match counts.
+/// Starts of files that cannot be read, in lower case, and their formats. The first match counts.
 const FOREIGN: [(&[u8], &str); 22] = [
     (b"version https://git-lfs", "a Git LFS pointer (see git lfs pull)"),
     (b"ply", "a PLY mesh that is not UTF-8"),

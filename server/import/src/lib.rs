@@ -6,7 +6,7 @@
 //! - No file is opened and no network is used: references to other files are ignored or refused by name.
 //! - Violations are reported with their places in the file, up to a bounded number; nothing panics.
 //!
-//! What a reader returns is split into triangles, welded and checked in the same way: see [`read_mesh`].
+//! The mesh that a reader returns is split into triangles, welded and checked in the same way: see [`read_mesh`].
 
 mod edges;
 mod error;

@@ -1,4 +1,4 @@
-//! What the names of a file's parts say that they are for, by the habits of engines and modelling tools.
+//! The purposes of a file's parts as told by their names, by the habits of engines and modelling tools.
 
 use crate::text::name_words;
 
@@ -111,7 +111,7 @@ fn level(name: &str) -> Option<(String, u32)> {
 mod tests {
     use super::*;
 
-    /// What a name tells, and of which part.
+    /// A purpose told by a name, and its part.
     fn role(name: &str) -> (Role, String) {
         let mut part = String::new();
         let role = Role::of(name, &mut |name| {

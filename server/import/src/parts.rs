@@ -12,8 +12,8 @@ use crate::{
 const LISTED_NAMES: usize = 8;
 const SHOWN_CHARACTERS: usize = 64;
 
-/// Leaves out what is no part of the object: all that does not have one of the names in `requested` or, if there are none, what
-/// is invisible, colliders and other helpers, and lower levels of detail.
+/// Leaves out faces that are not of the object: all that do not have one of the names in `requested` or, if there are none,
+/// invisible ones, colliders and other helpers, and lower levels of detail.
 pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<(), Violations> {
     let mut triangles = vec![0; raw.names.sets.len()];
     for face in raw.faces.iter() {
@@ -183,7 +183,7 @@ pub(crate) enum Aside {
     LowerLevel,
 }
 
-/// The names of faces, as indices, and what their file says of them.
+/// The names of faces, as indices, and their purpose in the file.
 #[derive(Debug, Default)]
 pub(crate) struct FaceNames {
     /// Of groups, objects, solids, nodes and meshes.

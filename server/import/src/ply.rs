@@ -250,7 +250,7 @@ impl<'a> Header<'a> {
     }
 }
 
-/// What counts of an element.
+/// The properties read of an element.
 #[derive(Debug, Default)]
 struct Row {
     position: [f64; 3],

@@ -195,7 +195,7 @@ fn clip(outline: &Outline, stop: Stop<'_>) -> Result<Option<Vec<[usize; 3]>>, St
     Ok(None)
 }
 
-/// What is left of a polygon.
+/// The rest of a polygon.
 struct Rest<'a> {
     outline: &'a Outline,
     /// The next corner of each corner that is left.

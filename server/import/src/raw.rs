@@ -30,7 +30,7 @@ pub(crate) fn too_far(metres: f64) -> String {
     )
 }
 
-/// What every reader returns.
+/// Output of every reader.
 #[derive(Debug, Default)]
 pub(crate) struct RawMesh {
     /// The vertices, in the file's units and axes.
@@ -43,14 +43,14 @@ pub(crate) struct RawMesh {
     pub(crate) triangles: usize,
     /// The names of faces' parts.
     pub(crate) names: NameSets,
-    /// What faces are counted by.
+    /// Unit in which faces are counted.
     pub(crate) places: Places,
-    /// What messages call the mesh of a format that its sender may believe to be another; empty for OBJ.
+    /// Name in messages of the mesh of a format that its sender may believe to be another; empty for OBJ.
     name: &'static str,
     /// Vertices that no face uses, if the reader knows.
     pub(crate) unused_vertices: usize,
     pub(crate) oddities: Oddities,
-    /// What was read otherwise than may be expected.
+    /// Warnings of content read otherwise than may be expected.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -259,7 +259,7 @@ impl Occurrences {
     }
 }
 
-/// What may be odd about a file and its mesh, in the order of their warnings.
+/// Possible oddities of a file and its mesh, in the order of their warnings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Oddity {
     UnknownLine,

@@ -1,4 +1,4 @@
-//! Splits the polygons of a mesh from a file, welds it, checks it and repairs what is certain.
+//! Splits the polygons of a mesh from a file, welds it, checks it and makes the repairs that are certain.
 
 use std::{
     collections::HashMap,

@@ -184,7 +184,7 @@ impl Character {
     }
 }
 
-/// What a skinned mesh consists of.
+/// The data of a skinned mesh.
 #[derive(Default)]
 struct Body {
     positions: Vec<Vec3>,

@@ -1,4 +1,4 @@
-//! How much memory reading a mesh takes, and an object once it is read. In a binary of its own, because it counts what is allocated.
+//! How much memory reading a mesh takes, and an object once it is read. In a binary of its own, because it counts allocations.
 
 use std::{
     collections::BTreeMap,
@@ -198,14 +198,14 @@ fn meshes(root: &Path) -> Vec<String> {
     found
 }
 
-/// What an object may take at rest: a multiple of its mesh, and bytes in any case.
+/// Memory that an object may take at rest: a multiple of its mesh, and bytes in any case.
 const MESHES: usize = 3;
 const BYTES_AT_REST: usize = 64 << 10;
 
-/// What may be derived from it, beside the hierarchy of its triangles.
+/// Memory of data derived from it, beside the hierarchy of its triangles.
 const BYTES_DERIVED: usize = 400_000;
 
-/// Largest error of an estimate, as a share, and what allocations take that nobody counts.
+/// Largest error of an estimate, as a share, and bytes of allocations that nobody counts.
 const ERROR: f64 = 0.05;
 const UNCOUNTED: f64 = 16_384.0;
 

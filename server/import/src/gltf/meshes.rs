@@ -15,7 +15,7 @@ use crate::{
     raw::{RawMesh, check_counts},
 };
 
-/// What is wrong is in this extension.
+/// Extension named as the place of errors.
 const EXTENSION: &str = "EXT_mesh_gpu_instancing";
 
 /// Sets of four joints per vertex that are read.
@@ -198,7 +198,7 @@ fn indices(
         return Ok((0..vertices as u32).collect());
     };
     check_counts(0, accessor.count() as u64 / 3, buffers.limits)?;
-    // What is no whole number in range becomes the largest, which no vertex has.
+    // Anything but a whole number in range becomes the largest, which no vertex has.
     let index_of = |[number]: [f64; 1]| if number >= 0.0 { number as u32 } else { u32::MAX };
     let indices = buffers.read(&accessor, accessor.count(), index_of)?;
     match indices.iter().find(|&&index| index as usize >= vertices) {

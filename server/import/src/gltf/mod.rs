@@ -2,7 +2,7 @@
 //! anything moves, with skins and morph targets at rest.
 //!
 //! The crate parses and validates the document. Accessors are read by [`Buffers`], because the crate's own iterators trust
-//! lengths. What has no shape (materials, textures, animations, cameras) is dropped before validation, so that unusual ones
+//! lengths. Data without shape (materials, textures, animations, cameras) are dropped before validation, so that unusual ones
 //! do not keep a mesh from being read.
 
 mod meshes;
@@ -58,7 +58,7 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
 pub(crate) struct Opened<'a> {
     /// Its text.
     pub(crate) json: Cow<'a, [u8]>,
-    /// What has a shape.
+    /// Its content with a shape.
     pub(crate) document: Document,
     /// Its buffers.
     pub(crate) buffers: Buffers<'a>,
@@ -130,7 +130,7 @@ fn json_and_binary(bytes: &[u8]) -> Result<(Bytes<'_>, Option<Bytes<'_>>), Impor
     Ok((glb.json, glb.bin))
 }
 
-/// Drops what has no shape.
+/// Drops everything without a shape.
 fn strip(root: &mut Root) {
     root.extensions_required.clear();
     root.animations.clear();
@@ -332,7 +332,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// What the integers of an accessor are divided by; `None` if they stand for themselves.
+/// Divisor of the integers of an accessor; `None` if they are not normalized.
 fn scale_of(accessor: &Accessor<'_>) -> Option<f64> {
     let scale = match accessor.data_type() {
         DataType::I8 => 127.0,

@@ -1,4 +1,4 @@
-//! Whether the bones of a hand lie in the skin that they move, and what the skin does not show.
+//! Whether the bones of a hand lie in the skin that they move, and which parts have no skin.
 
 use glam::Vec3;
 use grasp_synthesis::model::hand::{
@@ -178,7 +178,7 @@ impl HandCheck<'_> {
         }
     }
 
-    /// Warns of what the model does not show.
+    /// Warns of parts that the model does not show.
     fn tell_what_is_taken(&self, warnings: &mut Vec<String>) {
         let (name, reference) = (hand_name(self.side), &self.source.reference.name);
         if self.skin.is_empty() {

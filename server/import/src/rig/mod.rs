@@ -57,7 +57,7 @@ pub struct MappedJoint {
     pub joint: String,
 }
 
-/// What a rig is made from beside the file or joints.
+/// Inputs of a rig beside the file or joints.
 #[derive(Clone, Copy, Debug)]
 pub struct RigSource<'a> {
     /// The rig's name.
@@ -70,7 +70,7 @@ pub struct RigSource<'a> {
     pub joint_map: &'a [MappedJoint],
     /// The limits of the joints, thumb first.
     pub limits: [DigitLimits; 5],
-    /// What the measured widths are multiplied by.
+    /// Factor of the measured widths.
     pub width_scale: f32,
     /// Radii that go before measured ones, by `OpenXR` index, in metres.
     pub radii: [Option<f32>; JOINT_COUNT],
@@ -96,7 +96,7 @@ pub struct ImportedRig {
     pub left: ImportedHand,
     /// The right hand.
     pub right: ImportedHand,
-    /// What could not be read and was taken from the reference, and what is odd about bones and skin.
+    /// Values taken from the reference because the model lacks them, and oddities of bones and skin.
     pub warnings: Vec<String>,
 }
 

@@ -3,7 +3,7 @@
 //! VRM file names in its extension, whatever its nodes are called.
 //!
 //! Programs wrote files that the schemas of VRM do not allow and that every viewer takes: bones with the node −1 or null, the
-//! thumb's names of 0.x in drafts of 1.0, hands without fingers. What is not a bone with a node is skipped.
+//! thumb's names of 0.x in drafts of 1.0, hands without fingers. Entries without a bone's node are skipped.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use serde_json::Value;
 use super::{hand_nodes::HandNodes, model::Model};
 use crate::text::name_words;
 
-/// What a name says about a node.
+/// Meaning of a node's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NodeName {
     /// The hand, if the name has one.

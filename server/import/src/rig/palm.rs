@@ -65,7 +65,7 @@ pub(super) fn flesh(
     let is_of_palm = |joint: usize| joint == index::WRIST || index::FIRST_OF_DIGIT[1..].contains(&joint);
     let vertices = skin.iter().filter_map(|vertex| {
         if is_of_palm(vertex.joint) {
-            // What is behind the wrist is forearm.
+            // Skin behind the wrist is forearm.
             Some(vertex.position).filter(|position| position.y > 0.0)
         } else {
             let is_of_thumb = vertex.joint == index::FIRST_OF_DIGIT[0];

@@ -136,7 +136,7 @@ impl Widths {
         if let [Some(knuckle), Some(second), ..] = &mut measured {
             *knuckle = knuckle.min(KNUCKLE_SHARE * *second);
         }
-        // What the skin does not show is as thick, relative to the reference, as what it shows.
+        // Segments without skin are as thick, relative to the reference, as those with skin.
         let ratios = measured.iter().zip(expected);
         let ratios = ratios.filter_map(|(radius, expected)| Some((*radius)? / expected));
         let ratio = median(ratios.collect(), 1).unwrap_or(1.0);

@@ -1,4 +1,4 @@
-//! The same solid in all formats, damaged files, and what is particular to PLY and STL.
+//! The same solid in all formats, damaged files, and particulars of PLY and STL.
 
 use crate::{
     Import, MeshLimits, UpAxis, read_mesh,

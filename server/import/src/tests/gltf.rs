@@ -193,7 +193,7 @@ fn skins_are_at_rest_as_their_joints_are() {
 }
 
 #[test]
-fn what_cannot_be_read_is_named() {
+fn unreadable_content_is_named() {
     let ring = Ring::new();
     let json = ring.gltf_json("", "");
     let required = |extension: &str| {

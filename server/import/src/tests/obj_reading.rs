@@ -172,7 +172,7 @@ fn colours_change_nothing_and_weights_divide() {
     );
 }
 
-/// The OBJ files of a folder of the test data, sorted; none if the data are missing.
+/// The OBJ files of a folder of the test data, sorted; empty without the data.
 fn data(folder: &str) -> Vec<PathBuf> {
     let root = std::env::var_os("GRASP_TEST_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),

@@ -107,7 +107,7 @@ fn instances_are_shown_where_their_attributes_say() {
 }
 
 #[test]
-fn what_is_not_seen_is_left_out_and_can_be_requested() {
+fn unseen_parts_are_left_out_and_can_be_requested() {
     let hidden = r#","extensions":{"KHR_node_visibility":{"visible":false}}"#;
     let of_hubs = r#","extensions":{"MOZ_hubs_components":{"visible":{"visible":false}}}"#;
     let collider = r#","extensions":{"OMI_collider":{"collider":0}}"#;

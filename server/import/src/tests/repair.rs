@@ -113,7 +113,7 @@ fn mesh_near_the_origin_of_its_file_stays_there() {
         assert!((found.origin_in_file - DVec3::Z * moved).length() < 1e-12);
         assert_eq!(found.warnings.len(), usize::from(moved > 0.0));
     }
-    // What a mesh does not use does not count.
+    // Unused vertices do not count.
     let unused = format!("v 5000 0 0\n{}", cube(0.1).obj());
     assert_eq!(tests::read(unused).unwrap().origin_in_file, DVec3::ZERO);
 }

@@ -28,7 +28,7 @@ fn warnings(style: &Style) -> Vec<String> {
 }
 
 #[test]
-fn what_is_taken_from_the_reference_is_told() {
+fn values_from_the_reference_are_told() {
     let texts = warnings(&named(mixamo));
     let start = "right hand: has no index-finger-metacarpal, middle-finger-metacarpal";
     assert_mentioned(&texts, &[start, "rig adult"]);
