@@ -7,8 +7,7 @@ use super::{
 use crate::{
     base::{
         pose::Pose,
-        rejection::{Failure, Rejection},
-        stop::Stop,
+        rejection::Rejection,
         stopwatch::{Step, Stopwatch},
     },
     model::{
@@ -25,7 +24,6 @@ use crate::{
         grip::{Grip, Gripper, PosedDigits, clear_of_barriers},
         immobility::{Balance, Buffers, balance},
         presented::{ObjectScene, Presented},
-        shape::Proposal,
         solids::{HandSolids, TrackedSolids},
     },
     thesis::algorithm_1::HeldObject,
@@ -86,32 +84,6 @@ impl GraspContext<'_> {
             |hang| hang.relative_lip(),
         );
         self.rated(grasp, relative_closure, solids).map(Box::new)
-    }
-
-    /// Closes and checks a proposed hand.
-    ///
-    /// # Errors
-    /// The first check that fails, or the stop signal.
-    pub fn hold(
-        &self,
-        proposal: &Proposal,
-        gripper: &mut Gripper,
-        stopwatch: &mut Stopwatch<'_>,
-        stop: Stop<'_>,
-    ) -> Result<Box<Grasp>, Failure> {
-        let (grip, solids) = self.close(proposal, gripper, stopwatch, stop)?;
-        Ok(self.assess(&grip, &solids, gripper, stopwatch)?)
-    }
-
-    pub(crate) fn close(
-        &self,
-        proposal: &Proposal,
-        gripper: &mut Gripper,
-        stopwatch: &mut Stopwatch<'_>,
-        stop: Stop<'_>,
-    ) -> Result<(Grip, HandSolids), Failure> {
-        let presented = Some(self.presented);
-        gripper.grip(&self.object, self.rig, proposal, presented, stopwatch, stop)
     }
 
     /// Closes or opens the digits of a posed hand as little as it takes to touch and assesses the grasp or, if that is not valid,

@@ -19,10 +19,10 @@ use crate::{
     },
     physical::{
         both_hands::{HalfGrip, are_clear, suits_one_body},
-        grip::Gripper,
+        grip::{Grip, Gripper},
         immobility::Buffers,
         shape::{HandShape, Proposal},
-        solids::PreparedHand,
+        solids::{HandSolids, PreparedHand},
     },
     propose::{
         both_hands::{Aim, Mirror},
@@ -196,7 +196,7 @@ impl Attempt {
         let held = if is_guided {
             hold_or_refine(gripper, around, &proposal, course.stream, course.stopwatch, stop)
         } else {
-            around.hold(&proposal, gripper, course.stopwatch, stop)
+            hold(gripper, around, &proposal, course.stopwatch, stop)
         };
         self.posed.extend_from_slice(&gripper.posed);
         held
@@ -261,6 +261,32 @@ fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure
 /// Consecutive perturbations without improvement before a near miss is given up.
 const MAX_FAILED_REFINEMENTS: usize = 4;
 
+/// Closes and checks a proposed hand.
+///
+/// # Errors
+/// The first check that fails, or the stop signal.
+pub fn hold(
+    gripper: &mut Gripper,
+    around: &GraspContext<'_>,
+    proposal: &Proposal,
+    stopwatch: &mut Stopwatch<'_>,
+    stop: Stop<'_>,
+) -> Result<Box<Grasp>, Failure> {
+    let (grip, solids) = close(gripper, around, proposal, stopwatch, stop)?;
+    Ok(around.assess(&grip, &solids, gripper, stopwatch)?)
+}
+
+fn close(
+    gripper: &mut Gripper,
+    around: &GraspContext<'_>,
+    proposal: &Proposal,
+    stopwatch: &mut Stopwatch<'_>,
+    stop: Stop<'_>,
+) -> Result<(Grip, HandSolids), Failure> {
+    let presented = Some(around.presented);
+    gripper.grip(&around.object, around.rig, proposal, presented, stopwatch, stop)
+}
+
 /// Closes and checks a proposed hand. If it nearly has enough closure, perturbs it repeatedly, always from the hand with most
 /// closure.
 ///
@@ -274,7 +300,7 @@ pub fn hold_or_refine(
     stopwatch: &mut Stopwatch<'_>,
     stop: Stop<'_>,
 ) -> Result<Box<Grasp>, Failure> {
-    let mut rejected = around.hold(proposal, gripper, stopwatch, stop);
+    let mut rejected = hold(gripper, around, proposal, stopwatch, stop);
     let (Err(Failure::Rejected { .. }), Some(share)) = (&rejected, gripper.near_miss()) else {
         return rejected;
     };
@@ -285,7 +311,7 @@ pub fn hold_or_refine(
     while failures < MAX_FAILED_REFINEMENTS {
         failures += 1;
         let perturbed = nearest.1.perturbed(stream);
-        match around.hold(&perturbed, gripper, stopwatch, stop) {
+        match hold(gripper, around, &perturbed, stopwatch, stop) {
             // The hand holds the object but violates the requirements.
             Err(unmet) if unmet == Rejection::UnmetRequirement.into() => {
                 rejected = Err(unmet);
@@ -460,7 +486,7 @@ fn close_half(
     proposal: &Proposal,
     course: &mut Course<'_, '_>,
 ) -> Result<HalfGrip, Failure> {
-    let (grip, solids) = around.close(proposal, gripper, course.stopwatch, course.stop)?;
+    let (grip, solids) = close(gripper, around, proposal, course.stopwatch, course.stop)?;
     Ok(HalfGrip {
         grip,
         solids,

@@ -67,7 +67,7 @@ pub(crate) use grasp_synthesis::{
     },
     search::{
         GraspSource, SearchEnd, SearchOutcome,
-        attempt::hold_or_refine,
+        attempt::{hold, hold_or_refine},
         current::{CurrentGrasp, CurrentGraspStatus, Settlement},
         verdicts::Judgement,
     },

@@ -291,7 +291,7 @@ fn refinement_keeps_valid_hands_and_perturbs_near_misses_until_more_hold() {
         let Some(proposal) = propose(&place, &mut stream, Stop::NEVER) else {
             continue;
         };
-        let first = around.hold(&proposal, &mut plain, &mut Stopwatch::off(), Stop::NEVER);
+        let first = hold(&mut plain, &around, &proposal, &mut Stopwatch::off(), Stop::NEVER);
         let end = hold_or_refine(
             &mut refining,
             &around,
