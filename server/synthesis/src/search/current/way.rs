@@ -203,3 +203,31 @@ fn distance(a: &HandJoints, b: &HandJoints) -> f32 {
         .map(|joint| at(a, joint).distance(at(b, joint)))
         .fold(0.0, f32::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+
+    use super::*;
+
+    #[test]
+    fn way_of_a_wrist_has_the_distance_and_the_angle_it_was_made_with() {
+        let from = Pose::new(
+            Vec3::new(0.1, -0.2, 0.3),
+            Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.0),
+        );
+        for angle in [0.0, 1e-4, 0.3, 2.0, 3.1] {
+            for sign in [1.0, -1.0] {
+                let turn = Quat::from_axis_angle(Vec3::new(0.0, -0.8, 0.6), angle * sign);
+                let to = Pose::new(
+                    from.position + Vec3::new(0.0, 0.03, 0.04),
+                    // Either of the quaternions of an orientation.
+                    (from.orientation * turn) * sign,
+                );
+                let way = WristWay::between(from, to);
+                assert!((way.distance - 0.05).abs() < 1e-6 && (way.angle - angle).abs() < 1e-5);
+                assert!((way.length() - 0.05 - 0.1 * angle).abs() < 2e-6);
+            }
+        }
+    }
+}
