@@ -3,11 +3,14 @@
 //! the hand's shape, a contact's third coordinate from its triangle, its normal from triangle and hand.
 
 mod algorithm;
+mod bytes;
 
 use std::{fmt::Write as _, sync::Arc};
 
 use glam::{Quat, Vec3};
 use sha2::{Digest as _, Sha256};
+
+use bytes::{Codec, Reader, Writer};
 
 use super::{
     atlas::{Atlas, Grips},
@@ -174,93 +177,6 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
         early_stamp: header.early_stamp,
         original: None,
     })
-}
-
-/// One end of an encoding: a [`Writer`] appends the values that it is given, a [`Reader`] overwrites them with values that it
-/// reads. So one description of the format serves both.
-trait Codec {
-    const READS: bool;
-
-    fn bytes(&mut self, bytes: &mut [u8]) -> Result<(), AtlasError>;
-
-    fn ensure(&self, holds: bool, otherwise: &'static str) -> Result<(), AtlasError> {
-        if holds || !Self::READS {
-            Ok(())
-        } else {
-            Err(AtlasError::Malformed(otherwise))
-        }
-    }
-
-    fn u8(&mut self, number: &mut u8) -> Result<(), AtlasError> {
-        self.bytes(std::slice::from_mut(number))
-    }
-
-    fn u16(&mut self, number: &mut u16) -> Result<(), AtlasError> {
-        let mut bytes = number.to_be_bytes();
-        self.bytes(&mut bytes)?;
-        *number = u16::from_be_bytes(bytes);
-        Ok(())
-    }
-
-    fn u64(&mut self, number: &mut u64) -> Result<(), AtlasError> {
-        let mut bytes = number.to_be_bytes();
-        self.bytes(&mut bytes)?;
-        *number = u64::from_be_bytes(bytes);
-        Ok(())
-    }
-
-    fn floats<'a>(&mut self, numbers: impl IntoIterator<Item = &'a mut f32>) -> Result<(), AtlasError> {
-        for number in numbers {
-            let mut bytes = number.to_be_bytes();
-            self.bytes(&mut bytes)?;
-            *number = f32::from_be_bytes(bytes);
-            self.ensure(number.is_finite(), "a number is not finite")?;
-        }
-        Ok(())
-    }
-
-    /// A number of variable length: seven bits per byte, lowest first.
-    fn varint(&mut self, number: &mut u64) -> Result<(), AtlasError> {
-        let (mut left, mut passed) = (*number, 0);
-        for shift in (0..64).step_by(7) {
-            let mut byte = left as u8 & 0x7f | u8::from(left >= 0x80) << 7;
-            self.u8(&mut byte)?;
-            passed |= u64::from(byte & 0x7f) << shift;
-            left >>= 7;
-            if byte < 0x80 {
-                *number = passed;
-                return Ok(());
-            }
-        }
-        Err(AtlasError::Malformed("a number has too many bytes"))
-    }
-}
-
-struct Writer(Vec<u8>);
-
-impl Codec for Writer {
-    const READS: bool = false;
-
-    fn bytes(&mut self, bytes: &mut [u8]) -> Result<(), AtlasError> {
-        self.0.extend_from_slice(bytes);
-        Ok(())
-    }
-}
-
-struct Reader<'a>(&'a [u8]);
-
-impl Codec for Reader<'_> {
-    const READS: bool = true;
-
-    fn bytes(&mut self, bytes: &mut [u8]) -> Result<(), AtlasError> {
-        let (read, left) = self
-            .0
-            .split_at_checked(bytes.len())
-            .ok_or(AtlasError::Malformed("unexpected end"))?;
-        bytes.copy_from_slice(read);
-        self.0 = left;
-        Ok(())
-    }
 }
 
 /// The header after the format.
