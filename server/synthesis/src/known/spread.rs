@@ -241,3 +241,38 @@ impl Grid {
         ((point - self.low) / self.edge).floor().as_ivec3()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against the sphere at the nearest of many points along the axis.
+    #[test]
+    fn margins_are_those_of_the_sphere_nearest_along_the_axis() {
+        let grid = Grid {
+            low: Vec3::new(-0.1, -0.05, 0.02),
+            edge: 0.01,
+            counts: IVec3::splat(20),
+            places: Vec::new(),
+            filled: Vec::new(),
+            none: Bits::new(),
+        };
+        let solid = TaperedCapsule::new(Vec3::ZERO, Vec3::new(0.05, 0.03, 0.1), 0.012, 0.006);
+        for first in [IVec3::ZERO, IVec3::new(8, 3, 5), IVec3::new(4, 17, 12)] {
+            let margins = grid.squared_margins(&solid, 0.004, first);
+            for (lane, margin) in margins.into_iter().enumerate() {
+                let cell = first.as_vec3() + Vec3::X * lane as f32;
+                let centre = grid.low + (cell + 0.5) * grid.edge;
+                let shares = (0..=4000).map(|share| share as f32 / 4000.0);
+                let distance = |share: f32| solid.at(share).distance(centre);
+                let nearest = shares.min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+                let share = nearest.expect("there are some");
+                let expected = (solid.radius_at(share) + 0.004).powi(2) - distance(share).powi(2);
+                assert!(
+                    (margin - expected).abs() < 1e-6,
+                    "{centre}: {margin}, not {expected}"
+                );
+            }
+        }
+    }
+}
