@@ -1,4 +1,4 @@
-//! The purposes of a file's parts as told by their names, by the habits of engines and modelling tools.
+//! Purposes of a file's parts, inferred from their names by the habits of engines and modelling tools.
 
 use crate::text::name_words;
 
@@ -111,7 +111,7 @@ fn level(name: &str) -> Option<(String, u32)> {
 mod tests {
     use super::*;
 
-    /// A purpose told by a name, and its part.
+    /// A purpose inferred from a name, and its part.
     fn role(name: &str) -> (Role, String) {
         let mut part = String::new();
         let role = Role::of(name, &mut |name| {

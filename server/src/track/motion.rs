@@ -229,7 +229,7 @@ enum Body {
 struct Path(VecDeque<(Duration, Body)>);
 
 impl Path {
-    /// Adds a measurement. True if it begins anew: earlier ones say nothing about the body's velocity.
+    /// Adds a measurement. True if the track restarts with it: earlier ones say nothing about the body's velocity.
     fn add(&mut self, at: Duration, body: &Body) -> bool {
         let begins = match self.0.back() {
             None => true,

@@ -141,7 +141,7 @@ async fn an_object_out_of_memory_is_found_again_by_its_name() {
     let heavier = update_of(&names[2], |object| object.mass_kg = 0.4);
     update(&server, heavier).await.unwrap();
     assert_eq!(get(&server, &names[2]).await.unwrap().mass_kg, 0.4);
-    // Watchers are told only of the changes.
+    // Watchers see only the changes.
     for expected in [&names[1], &names[2]] {
         let report = bounded("a report", changes.message()).await.unwrap().unwrap();
         assert_eq!(report.changes, [i32::from(v1::ObjectChange::Updated)]);

@@ -4,13 +4,15 @@
 
 mod algorithm;
 mod bytes;
+mod key;
 
-use std::{fmt::Write as _, sync::Arc};
+use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 use sha2::{Digest as _, Sha256};
 
 use bytes::{Codec, Reader, Writer};
+use key::{KEY_BYTES, key};
 
 use super::{
     atlas::{Atlas, Grips},
@@ -25,9 +27,7 @@ use crate::{
         grasp::Contact,
         hand::{Digit, HandPart, HandPose, Phalanx, rig::Rig},
         object::GraspObject,
-        plain_object::PlainObject,
         score::Term,
-        strategy::Validity,
     },
     physical::{
         contacts::contact_normal, grip::Grip, immobility::MAX_CONTACTS, shape::HandShape, solids::HandSolids,
@@ -36,6 +36,7 @@ use crate::{
 };
 
 pub use algorithm::ALGORITHM;
+pub use key::file_name;
 
 /// The magic bytes that every atlas starts with.
 const MARK: [u8; 8] = *b"GRASPATL";
@@ -45,9 +46,6 @@ const FORMAT: u16 = 5;
 
 /// Length of the checksum in bytes.
 const CHECKSUM_BYTES: usize = 32;
-
-/// Length of a key in bytes.
-const KEY_BYTES: usize = 32;
 
 /// Smallest size of an encoded grip, in bytes: wrist, shape, digits, penetration and epsilon, terms, finger subsets, and empty
 /// scores, friction uses and contacts.
@@ -462,51 +460,4 @@ fn from_ordered(number: u32) -> f32 {
     } else {
         !number
     })
-}
-
-/// The SHA-256 of everything that the grips of an object and a hand depend on.
-fn key(object: &PlainObject, rig: &Rig) -> [u8; KEY_BYTES] {
-    fn add(hash: &mut Sha256, numbers: &[f32]) {
-        for number in numbers {
-            hash.update(number.to_le_bytes());
-        }
-    }
-    let mut hash = Sha256::new();
-    hash.update(ALGORITHM.to_le_bytes());
-    let (positions, triangles) = (object.mesh.positions(), object.mesh.triangles());
-    hash.update((positions.len() as u32).to_le_bytes());
-    hash.update((triangles.len() as u32).to_le_bytes());
-    for position in positions {
-        add(&mut hash, &position.to_array());
-    }
-    for (triangle, corners) in (0..).zip(triangles) {
-        for corner in corners {
-            hash.update(corner.to_le_bytes());
-        }
-        hash.update([u8::from(object.is_forbidden(triangle))]);
-    }
-    add(
-        &mut hash,
-        &[object.mass, object.friction_under(Validity::Physical)],
-    );
-    add(&mut hash, &object.centre_of_mass.to_array());
-    // Others guide the choice of grips only.
-    if object.regions().require_contacts() {
-        for number in object.regions().numbers() {
-            add(&mut hash, &[number]);
-        }
-    }
-    hash.update(rig.content());
-    hash.finalize().into()
-}
-
-/// The file name of the atlas of an object and a hand: hexadecimal digits of the key and ".atlas".
-pub fn file_name(object: &PlainObject, rig: &Rig) -> String {
-    let mut name = String::new();
-    // 128 bits do not collide by chance.
-    for byte in &key(object, rig)[..KEY_BYTES / 2] {
-        // Writing to a string cannot fail.
-        let _ = write!(name, "{byte:02x}");
-    }
-    name + ".atlas"
 }

@@ -1,5 +1,5 @@
 //! Grips moved to other surfaces: a hand posed on an object of another size, whose wrist follows the surface while the digits
-//! adapt, and mirror images on symmetric objects. Contacts of an image are found anew, as sharp edges may decide otherwise; an
+//! adapt, and mirror images on symmetric objects. Contacts of an image are recomputed, as sharp edges may decide otherwise; an
 //! image that does not hold closes its digits again, or is left out.
 
 use std::sync::Arc;

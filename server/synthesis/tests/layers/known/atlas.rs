@@ -136,7 +136,7 @@ fn the_first_answer_is_the_first_of_the_best_grade() {
         let found = guided(&holdout).atlas(&known).run();
         assert_eq!(found.report.source, first.map(GraspSource::Atlas), "{giver}");
         let Some(first) = first else { continue };
-        // Where both orders begin with the same grip, they cannot be told apart.
+        // Where both orders begin with the same grip, they are indistinguishable.
         if Some(first) != by_score.iter().copied().find(holding) {
             by_value += 1;
         }
