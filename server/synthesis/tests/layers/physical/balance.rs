@@ -132,7 +132,7 @@ fn forces_of_random_grasps_keep_every_limit_wherever_the_friction_use_starts() {
     let mut random = Random::new(12);
     let mut buffers = Buffers::default();
     let (mut counts, mut limited) = ([0; 3], 0);
-    for case in 0..3000 {
+    for case in 0..4000 {
         let contacts = random.contacts(1 + case % 10);
         let load = load(random.between(0.02, 4.0), random.direction(), 0.04);
         let found = balance(&contacts, &load, &mut buffers);
@@ -157,7 +157,7 @@ fn forces_of_random_grasps_keep_every_limit_wherever_the_friction_use_starts() {
         }
     }
     assert!(counts.iter().all(|&count| count > 30), "{counts:?}");
-    assert!(limited > 15, "only {limited} grasps come to a limit");
+    assert!(limited > 20, "only {limited} grasps come to a limit");
 }
 
 /// Contacts push at random inside their limits, and gravity balances their sum.
