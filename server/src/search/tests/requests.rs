@@ -104,10 +104,19 @@ prop_compose! {
     }
 }
 
-/// A client's own grasp, seldom of an unknown rig or missing.
+/// A client's own grasp, seldom of an unknown rig, with a digit missing or bent at will, or missing itself.
 pub(super) fn grasp() -> BoxedStrategy<Option<Grasp>> {
-    let posed =
-        |is_at_object| posed_hand(&RIGS, 0..=2, is_at_object).prop_map(|hand| Some(Grasp::Pose(hand)));
+    let angles = proptest::array::uniform4(number(-1.5..1.5)).prop_map(v1::DigitAngles::new);
+    let stray = option::weighted(0.1, (0..5_usize, option::of(angles))).boxed();
+    let posed = |is_at_object| {
+        (posed_hand(&RIGS, 0..=2, is_at_object), stray.clone()).prop_map(|(hand, stray)| {
+            let mut digits = hand.digits().map(Option::<&_>::cloned);
+            if let Some((digit, angles)) = stray {
+                digits[digit] = angles;
+            }
+            Some(Grasp::Pose(hand.with_digits(digits)))
+        })
+    };
     prop_oneof![
         15 => posed(true),
         15 => posed(false),
