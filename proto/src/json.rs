@@ -36,7 +36,9 @@ impl JsonError {
             path: Some(path.to_string()).filter(|path| path != "."),
             problem: problem.to_string(),
         };
-        mismatch.with_fields_of(message_at(path, message)).unwrap_or(mismatch)
+        mismatch
+            .with_fields_of(message_at(path, message))
+            .unwrap_or(mismatch)
     }
 
     /// The same error, if it is about an unknown field, with the fields that its message has.
@@ -44,7 +46,10 @@ impl JsonError {
         let (_, unknown) = self.problem.split_once("unrecognized field name '")?;
         let (unknown, _) = unknown.split_once('\'')?;
         let message = message?;
-        let fields: Vec<String> = message.fields().map(|field| field.json_name().to_owned()).collect();
+        let fields: Vec<String> = message
+            .fields()
+            .map(|field| field.json_name().to_owned())
+            .collect();
         let path = self.path.iter().map(String::as_str).chain([unknown]);
         Some(Self {
             path: Some(path.collect::<Vec<_>>().join(".")),
@@ -58,10 +63,14 @@ fn message_at(path: &Path, message: &MessageDescriptor) -> Option<MessageDescrip
     let mut at = message.clone();
     for segment in path {
         let Segment::Map { key } = segment else { continue };
-        let field = at.get_field_by_json_name(key).or_else(|| at.get_field_by_name(key));
+        let field = at
+            .get_field_by_json_name(key)
+            .or_else(|| at.get_field_by_name(key));
         // A key of a map is no field of its entries.
         let Some(field) = field else { continue };
-        let Kind::Message(inner) = field.kind() else { return None };
+        let Kind::Message(inner) = field.kind() else {
+            return None;
+        };
         at = inner;
     }
     Some(at)
@@ -177,7 +186,11 @@ mod tests {
         let obstacle = json!({"holdout": {"obstacles": [{"ball": {}}]}});
         let (budget, seed) = (json!({"budget": 2}), json!({"seed": "-1"}));
         for (wrong, path, problem) in [
-            (json!({"objekt": ""}), Some("objekt"), "FindGraspRequest; it has holdout, receiver"),
+            (
+                json!({"objekt": ""}),
+                Some("objekt"),
+                "FindGraspRequest; it has holdout, receiver",
+            ),
             (obstacle, Some("holdout.obstacles[0].ball"), "Shape; it has "),
             (json!({"search": budget}), Some("search.budget"), "2"),
             (json!({"search": seed}), Some("search.seed"), "invalid digit"),

@@ -1,17 +1,21 @@
 //! Answers: gRPC's frames and status, turned into Connect's.
 
-use std::task::{Context, Poll};
+use std::{
+    borrow::Cow,
+    collections::BTreeMap,
+    task::{Context, Poll},
+};
 
 use bytes::{BufMut as _, Bytes, BytesMut};
 use http::{HeaderMap, HeaderName, HeaderValue, Response, StatusCode, header};
 use http_body::Frame;
 use http_body_util::{BodyExt as _, Full};
-use serde_json::{Map, Value};
+use serde::Serialize;
 use tonic::{Code, Status, body::Body};
 
 use super::{
     Format,
-    errors::{error, http_status},
+    errors::{ErrorBody, http_status},
     messages::{PACKED, PREFIX},
 };
 use crate::middleware::{FrameFilter, PolledFrame, filtered, next_frame};
@@ -76,7 +80,7 @@ pub(super) fn failure(status: &Status, format: Format) -> Response<Body> {
 
 /// An error that is no message of a stream, with a status of HTTP.
 pub(super) fn refusal(http: StatusCode, status: &Status) -> Response<Body> {
-    let mut answer = whole(http, "application/json", error(status).to_string().into());
+    let mut answer = whole(http, "application/json", json(&ErrorBody::from(status)).into());
     let metadata = status.metadata().clone().into_headers();
     answer.headers_mut().extend(trailing(&metadata));
     answer
@@ -135,28 +139,36 @@ impl FrameFilter for StreamEnd {
     }
 }
 
+/// The message that ends a stream.
+#[derive(Serialize)]
+struct EndOfStream<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<ErrorBody>,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    metadata: BTreeMap<&'a str, Vec<Cow<'a, str>>>,
+}
+
 fn end_of_stream(status: &Status) -> Bytes {
-    let mut end = Map::new();
-    if status.code() != Code::Ok {
-        end.insert("error".to_owned(), error(status));
-    }
-    let mut lists: Map<String, Value> = Map::new();
     let trailers = status.metadata().clone().into_headers();
-    for (name, value) in metadata(&trailers) {
-        let values = lists.entry(name.as_str()).or_insert_with(|| Value::Array(Vec::new()));
-        if let Some(values) = values.as_array_mut() {
-            values.push(String::from_utf8_lossy(value.as_bytes()).into());
-        }
+    let mut metadata: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for (name, value) in own(&trailers) {
+        let value = String::from_utf8_lossy(value.as_bytes());
+        metadata.entry(name.as_str()).or_default().push(value);
     }
-    if !lists.is_empty() {
-        end.insert("metadata".to_owned(), lists.into());
-    }
-    let text = Value::from(end).to_string();
+    let text = json(&EndOfStream {
+        error: (status.code() != Code::Ok).then(|| status.into()),
+        metadata,
+    });
     let mut envelope = BytesMut::with_capacity(PREFIX + text.len());
     envelope.put_u8(END);
     envelope.put_u32(text.len() as u32);
-    envelope.put_slice(text.as_bytes());
+    envelope.put_slice(&text);
     envelope.freeze()
+}
+
+fn json(value: &impl Serialize) -> Vec<u8> {
+    // Texts, lists and maps of texts are always JSON.
+    serde_json::to_vec(value).unwrap_or_default()
 }
 
 fn status_in(trailers: &HeaderMap) -> Status {
@@ -164,15 +176,20 @@ fn status_in(trailers: &HeaderMap) -> Status {
 }
 
 /// Headers that are neither HTTP's nor gRPC's.
+fn own(headers: &HeaderMap) -> impl Iterator<Item = (&HeaderName, &HeaderValue)> {
+    headers
+        .iter()
+        .filter(|(name, _)| !OF_PROTOCOL.contains(&name.as_str()))
+}
+
 fn metadata(headers: &HeaderMap) -> impl Iterator<Item = (HeaderName, HeaderValue)> {
-    let own = headers.iter().filter(|(name, _)| !OF_PROTOCOL.contains(&name.as_str()));
-    own.map(|(name, value)| (name.clone(), value.clone()))
+    own(headers).map(|(name, value)| (name.clone(), value.clone()))
 }
 
 /// Trailing metadata as headers.
 fn trailing(headers: &HeaderMap) -> impl Iterator<Item = (HeaderName, HeaderValue)> {
-    metadata(headers).filter_map(|(name, value)| {
+    own(headers).filter_map(|(name, value)| {
         let name = format!("trailer-{name}").parse().ok()?;
-        Some((name, value))
+        Some((name, value.clone()))
     })
 }

@@ -4,7 +4,8 @@ use base64::{Engine as _, engine::general_purpose::STANDARD_NO_PAD};
 use grasp_proto::json::text_of;
 use http::StatusCode;
 use prost::Message as _;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::Value;
 use tonic::{Code, Status};
 use tonic_types::pb;
 
@@ -34,29 +35,45 @@ pub(super) fn http_status(code: Code) -> (StatusCode, &'static str) {
     (StatusCode::from_u16(status).unwrap_or_default(), name)
 }
 
-/// A status as Connect's error.
-pub(super) fn error(status: &Status) -> Value {
-    let mut error = Map::new();
-    error.insert("code".to_owned(), http_status(status.code()).1.into());
-    if !status.message().is_empty() {
-        error.insert("message".to_owned(), status.message().into());
-    }
-    let details = pb::Status::decode(status.details()).unwrap_or_default().details;
-    if !details.is_empty() {
-        let details = details.iter().map(|detail| {
-            let name = detail.type_url.rsplit('/').next().unwrap_or_default();
-            let mut shown = json!({"type": name, "value": STANDARD_NO_PAD.encode(&detail.value)});
-            if let Some(debug) = debug(name, &detail.value) {
-                shown["debug"] = debug;
-            }
-            shown
-        });
-        error.insert("details".to_owned(), details.collect());
-    }
-    error.into()
+/// Connect's error.
+#[derive(Debug, Serialize)]
+pub(super) struct ErrorBody {
+    code: &'static str,
+    #[serde(skip_serializing_if = "String::is_empty")]
+    message: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    details: Vec<Detail>,
 }
 
-/// A detail as JSON, if its type is known.
+#[derive(Debug, Serialize)]
+struct Detail {
+    #[serde(rename = "type")]
+    name: String,
+    value: String,
+    /// The detail as JSON, if its type is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    debug: Option<Value>,
+}
+
+impl From<&Status> for ErrorBody {
+    fn from(status: &Status) -> Self {
+        let details = pb::Status::decode(status.details()).unwrap_or_default().details;
+        let details = details.into_iter().map(|detail| {
+            let name = detail.type_url.rsplit('/').next().unwrap_or_default();
+            Detail {
+                name: name.to_owned(),
+                value: STANDARD_NO_PAD.encode(&detail.value),
+                debug: debug(name, &detail.value),
+            }
+        });
+        Self {
+            code: http_status(status.code()).1,
+            message: status.message().to_owned(),
+            details: details.collect(),
+        }
+    }
+}
+
 fn debug(name: &str, value: &[u8]) -> Option<Value> {
     let text = text_of(&message(name)?, value).ok()?;
     serde_json::from_slice(&text).ok()

@@ -208,13 +208,17 @@ impl Reader {
         let Some(&[flags, a, b, c, d]) = self.buffer.first_chunk::<PREFIX>() else {
             let left = self.buffer.len();
             return match left {
-                1.. if self.ended => malformed(format!("the request ends after {left} of an envelope's 5 first bytes")),
+                1.. if self.ended => malformed(format!(
+                    "the request ends after {left} of an envelope's 5 first bytes"
+                )),
                 _ => Ok(None),
             };
         };
         let length = u32::from_be_bytes([a, b, c, d]) as usize;
         if flags & !PACKED != 0 {
-            return malformed(format!("the flags of an envelope are {flags}; they must be 0, or 1 if it is packed"));
+            return malformed(format!(
+                "the flags of an envelope are {flags}; they must be 0, or 1 if it is packed"
+            ));
         }
         if flags & PACKED != 0 && !self.call.packed {
             return malformed("an envelope is packed, but connect-content-encoding is not gzip".to_owned());
@@ -225,7 +229,9 @@ impl Reader {
         let arrived = self.buffer.len() - PREFIX;
         if arrived < length {
             if self.ended {
-                return malformed(format!("the request ends after {arrived} of {length} bytes of an envelope"));
+                return malformed(format!(
+                    "the request ends after {arrived} of {length} bytes of an envelope"
+                ));
             }
             return Ok(None);
         }
@@ -248,7 +254,10 @@ fn read(call: &Call, message: Bytes, packed: bool, limit: usize) -> Result<Bytes
 
 fn protobuf(call: &Call, text: &[u8]) -> Result<Vec<u8>, ServiceError> {
     if text.trim_ascii().is_empty() {
-        return Err(ServiceError::invalid(BODY, "is empty; it must be a JSON object, such as {}"));
+        return Err(ServiceError::invalid(
+            BODY,
+            "is empty; it must be a JSON object, such as {}",
+        ));
     }
     bytes_of(&call.method.input(), text)
         .map_err(|error| ServiceError::invalid(error.path.unwrap_or_else(|| BODY.to_owned()), error.problem))
@@ -256,8 +265,12 @@ fn protobuf(call: &Call, text: &[u8]) -> Result<Vec<u8>, ServiceError> {
 
 fn unpacked(message: &[u8], limit: usize) -> Result<Bytes, ServiceError> {
     let mut content = Vec::new();
-    let read = MultiGzDecoder::new(message).take(limit as u64 + 1).read_to_end(&mut content);
-    read.map_err(|error| ServiceError::Malformed(format!("a message is packed, but not with gzip: {error}")))?;
+    let read = MultiGzDecoder::new(message)
+        .take(limit as u64 + 1)
+        .read_to_end(&mut content);
+    read.map_err(|error| {
+        ServiceError::Malformed(format!("a message is packed, but not with gzip: {error}"))
+    })?;
     if content.len() > limit {
         return Err(ServiceError::MessageTooLarge { limit });
     }
@@ -297,7 +310,10 @@ impl FrameFilter for Writer {
                 Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
             };
             let call = self.call.clone();
-            if let Some(messages) = self.turning.begin(messages.len(), move || written(&call, messages)) {
+            if let Some(messages) = self
+                .turning
+                .begin(messages.len(), move || written(&call, messages))
+            {
                 return turned(messages);
             }
         }

@@ -24,7 +24,9 @@ static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
 });
 
 static METHODS: LazyLock<HashMap<String, Method>> = LazyLock::new(|| {
-    let methods = POOL.services().flat_map(|service| service.methods().collect::<Vec<_>>());
+    let methods = POOL
+        .services()
+        .flat_map(|service| service.methods().collect::<Vec<_>>());
     let by_path = methods.map(|method| {
         let path = format!("/{}/{}", method.parent_service().full_name(), method.name());
         (path, method)
@@ -41,7 +43,11 @@ pub(super) fn method(path: &str) -> Option<&'static Method> {
 pub(super) fn named_like(path: &str) -> Vec<&'static str> {
     let name = |path: &str| path.rsplit('/').next().unwrap_or_default().to_ascii_lowercase();
     let wanted = name(path);
-    let mut like: Vec<&str> = METHODS.keys().map(String::as_str).filter(|known| name(known) == wanted).collect();
+    let mut like: Vec<&str> = METHODS
+        .keys()
+        .map(String::as_str)
+        .filter(|known| name(known) == wanted)
+        .collect();
     like.sort_unstable();
     like
 }

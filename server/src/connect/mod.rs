@@ -35,7 +35,9 @@ pub(crate) struct Format {
 impl Format {
     /// The format of a content type without parameters.
     pub(crate) fn of(media_type: &str) -> Option<Self> {
-        let known = Self::all().into_iter().find(|format| format.content_type() == media_type);
+        let known = Self::all()
+            .into_iter()
+            .find(|format| format.content_type() == media_type);
         known.filter(|_| !media_type.is_empty())
     }
 

@@ -85,7 +85,11 @@ pub(super) fn call(head: &mut Parts, format: Format) -> Result<Call, Response<Bo
     }
     headers.remove(header::CONTENT_LENGTH);
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/grpc"));
-    Ok(Call { format, method, packed })
+    Ok(Call {
+        format,
+        method,
+        packed,
+    })
 }
 
 /// The method that a request calls.
@@ -101,7 +105,10 @@ fn called(head: &Parts, format: Format) -> Result<&'static Method, Response<Body
     };
     let streams = method.is_client_streaming() || method.is_server_streaming();
     if streams != format.enveloped {
-        let right = Format { enveloped: streams, ..format };
+        let right = Format {
+            enveloped: streams,
+            ..format
+        };
         let kind = if streams { "a stream" } else { "no stream" };
         let problem = format!(
             "{} is {kind}; content-type is {}; it must be {}",
