@@ -1,10 +1,10 @@
 /** Clients of a server, and its errors. */
 
-import { createClient, ConnectError, type Client } from "@connectrpc/connect";
+import { Code, createClient, ConnectError, type Client } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { BadRequestSchema, ErrorInfoSchema, RetryInfoSchema, type BadRequest_FieldViolation } from "./gen/google/rpc/error_details_pb.js";
 import { GraspService } from "./gen/grasp/v1/grasp_service_pb.js";
-import { HandRigService } from "./gen/grasp/v1/hand_rig_service_pb.js";
+import { HandRigService, type HandRig } from "./gen/grasp/v1/hand_rig_service_pb.js";
 import { ObjectService } from "./gen/grasp/v1/object_service_pb.js";
 
 /** The services of a server. */
@@ -25,6 +25,21 @@ export function createGraspClient(baseUrl: string): GraspClient {
     objects: createClient(ObjectService, transport),
     rigs: createClient(HandRigService, transport),
   };
+}
+
+/**
+ * The rig of your own hand or avatar: creates it from files (GLB, glTF or VRM), or takes the one that has the id. `rigId` has 1 to 63
+ * characters of a-z, 0-9 and -.
+ */
+export async function createRigOnce({ rigs }: GraspClient, rigId: string, ...models: Uint8Array[]): Promise<HandRig> {
+  try {
+    return await rigs.createRig({ rigId, models });
+  } catch (error) {
+    if (ConnectError.from(error).code === Code.AlreadyExists) {
+      return await rigs.getRig({ name: `rigs/${rigId}` });
+    }
+    throw error;
+  }
 }
 
 /** The wrong fields that an error names, each with what is wrong with it; empty for other errors. */
