@@ -1,7 +1,7 @@
 /** Clients of a server, and its errors. */
 
 import { Code, createClient, ConnectError, type Client } from "@connectrpc/connect";
-import { createGrpcWebTransport } from "@connectrpc/connect-web";
+import { createConnectTransport } from "@connectrpc/connect-web";
 import { BadRequestSchema, ErrorInfoSchema, RetryInfoSchema, type BadRequest_FieldViolation } from "./gen/google/rpc/error_details_pb.js";
 import { GraspService } from "./gen/grasp/v1/grasp_service_pb.js";
 import { HandRigService, type HandRig } from "./gen/grasp/v1/hand_rig_service_pb.js";
@@ -19,7 +19,7 @@ export interface GraspClient {
 
 /** The client of the server at a URL, such as "http://localhost:50051". Calls reject with a `ConnectError`. */
 export function createGraspClient(baseUrl: string): GraspClient {
-  const transport = createGrpcWebTransport({ baseUrl });
+  const transport = createConnectTransport({ baseUrl });
   return {
     grasps: createClient(GraspService, transport),
     objects: createClient(ObjectService, transport),
@@ -40,6 +40,15 @@ export async function createRigOnce({ rigs }: GraspClient, rigId: string, ...mod
     }
     throw error;
   }
+}
+
+/** The mesh of an object as GLB, as the server keeps it: in meters, in the object's frame. */
+export async function downloadMesh({ objects }: GraspClient, name: string): Promise<Uint8Array<ArrayBuffer>> {
+  const pieces: BlobPart[] = [];
+  for await (const { piece } of objects.getMesh({ name })) {
+    pieces.push(piece as Uint8Array<ArrayBuffer>);
+  }
+  return new Uint8Array(await new Blob(pieces).arrayBuffer());
 }
 
 /** The wrong fields that an error names, each with what is wrong with it; empty for other errors. */

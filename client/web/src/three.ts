@@ -37,6 +37,8 @@ export function poseOf(object: Object3D): Rigid {
  */
 export function poseHand(root: Object3D, hand: HandPose, space?: Object3D): void {
   root.updateWorldMatrix(true, true);
+  // Bounds of skinned meshes are those of their first pose: hands that left them would not be drawn.
+  root.traverse((object) => (object.frustumCulled = false));
   for (const { name, pose } of jointsOf(hand)) {
     const bone = root.getObjectByName(name);
     if (bone) {
@@ -51,6 +53,7 @@ export function poseHand(root: Object3D, hand: HandPose, space?: Object3D): void
  */
 export function poseModel(root: Object3D, hand: HandPose, space?: Object3D): void {
   root.updateWorldMatrix(true, true);
+  root.traverse((object) => (object.frustumCulled = false));
   for (const [index, { node, pose }] of convertHand(hand, Convention.OPENXR).model.entries()) {
     const object = root.getObjectByName(PropertyBinding.sanitizeNodeName(node));
     if (!object) {

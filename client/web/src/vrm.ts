@@ -54,6 +54,7 @@ export class VrmArm {
     private readonly handedness: Handedness.LEFT | Handedness.RIGHT,
     private readonly space?: Object3D,
   ) {
+    vrm.humanoid.update();
     const stretched = rig.hands.find((hand) => hand.handedness === handedness)?.stretchedJoints.map(({ pose }) => pose && rigid(pose));
     if (!stretched) {
       throw new Error(`${rig.name} lacks the hand`);
@@ -80,13 +81,13 @@ export class VrmArm {
         if (!bone || !joint) {
           return [];
         }
-        const next = this.rest(digit + parts[link + 1]);
-        if (next) {
-          const along = next.sub(this.rest(digit + part)!).applyQuaternion(this.wristFromModel);
+        const along = this.along(digit + part, digit + parts[link + 1]);
+        if (along) {
+          along.applyQuaternion(this.wristFromModel);
           const wanted = new Vector3(0, 0, -1).applyQuaternion(quaternion(joint.orientation));
           restToStretched = new Quaternion().setFromUnitVectors(along.normalize(), wanted);
         }
-        // The last bone has no next one, and lies in line with that before it.
+        // A last bone without an end is turned like the one before it.
         const stretchedFromRest = quaternion(joint.orientation).invert().multiply(restToStretched);
         return [{ bone, joint: JOINT_NAMES[joints[link]!]!, stretchedFromRest }];
       });
@@ -123,6 +124,21 @@ export class VrmArm {
       }
     }
     return place;
+  }
+
+  /** From a bone to the next one at rest, or to its end if the model has one. */
+  private along(part: string, next: string): Vector3 | undefined {
+    const [from, to] = [this.rest(part), this.rest(next)];
+    if (from && to) {
+      return to.sub(from);
+    }
+    const end = this.vrm.humanoid.getRawBoneNode(this.boneName(part))?.children.find(({ position }) => position.length() > 0);
+    if (!end) {
+      return undefined;
+    }
+    // The model may be posed: its normalized bone says how the bone has turned since.
+    const turn = this.bone(part).getWorldQuaternion(new Quaternion()).invert();
+    return end.getWorldPosition(new Vector3()).sub(end.parent!.getWorldPosition(new Vector3())).applyQuaternion(turn);
   }
 
   /** The turn of the model at rest to the rig's wrist: by the knuckles, or by the T-pose for hands without fingers. */

@@ -14,8 +14,7 @@ export function trackedJoints(frame: XRFrame, source: XRInputSource, space: XRSp
   }
   const poses = Array.from(source.hand.values(), (joint) => frame.getJointPose!(joint, space));
   // Some runtimes put all joints of a lost hand into one place.
-  const first = poses[0]?.transform.position;
-  const isHand = poses.some((pose) => pose && first && pose.transform.position.x !== first.x);
+  const isHand = new Set(poses.flatMap((pose) => pose?.transform.position.x ?? [])).size > 1;
   return create(HandJointsSchema, {
     handedness: source.handedness === "left" ? Handedness.LEFT : Handedness.RIGHT,
     joints: poses.map((pose) => (pose && isHand ? jointMessage(pose) : create(JointPoseSchema))),

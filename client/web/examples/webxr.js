@@ -1,0 +1,62 @@
+// The user pinches a remote control; a virtual hand takes it, and follows while the user's hand moves.
+
+import { HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { VRButton } from "three/addons/webxr/VRButton.js";
+import { XRHandModelFactory } from "three/addons/webxr/XRHandModelFactory.js";
+import { createGraspClient, CurrentGraspStatus, downloadMesh, GraspTracker, Handedness, poseMessage, presentingHand, trackedJoints } from "@grasp/client";
+import { place, poseHand, poseOf } from "@grasp/client/three";
+
+const OBJECT = "objects/remote";
+const client = createGraspClient(new URLSearchParams(location.search).get("server") ?? "http://localhost:50051");
+const tracker = new GraspTracker(client, { holdout: { object: OBJECT }, mayChangeHand: true }, {
+  onStatus: (status) => console.log(CurrentGraspStatus[status]),
+  onError: (error) => console.error(error.message),
+});
+
+const loader = new GLTFLoader();
+const object = (await loader.parseAsync((await downloadMesh(client, OBJECT)).buffer, "")).scene;
+const takers = new Map();
+for (const [handedness, side] of [[Handedness.LEFT, "left"], [Handedness.RIGHT, "right"]]) {
+  takers.set(handedness, (await loader.loadAsync(`../../../assets/hands/adult_${side}.glb`)).scene);
+}
+
+const renderer = new WebGLRenderer({ antialias: true });
+renderer.setSize(innerWidth, innerHeight);
+renderer.xr.enabled = true;
+document.body.append(renderer.domElement, VRButton.createButton(renderer, { requiredFeatures: ["hand-tracking"] }));
+const scene = new Scene().add(object, ...takers.values(), new HemisphereLight("white", "gray", 4));
+const camera = new PerspectiveCamera(60, innerWidth / innerHeight, 0.01, 10);
+const [left, right] = [renderer.xr.getHand(0), renderer.xr.getHand(1)];
+for (const hand of [left, right]) {
+  hand.add(new XRHandModelFactory().createHandModel(hand, "boxes"));
+  scene.add(hand);
+}
+
+// Puts the object between thumb and index finger, along the hand.
+function hold({ joints }) {
+  const [wrist, thumb, index] = [joints[0], joints[4], joints[9]].map(({ pose }) => pose);
+  place(object, wrist);
+  object.quaternion.multiply({ x: -Math.SQRT1_2, y: 0, z: 0, w: Math.SQRT1_2 });
+  const grip = new Vector3().addVectors(thumb.position, index.position).divideScalar(2);
+  object.position.copy(grip).add(new Vector3(0, 0.07, 0).applyQuaternion(object.quaternion));
+}
+
+renderer.setAnimationLoop((_, frame) => {
+  const giver = frame && [...frame.session.inputSources].find(({ hand }) => hand);
+  const joints = giver && trackedJoints(frame, giver, renderer.xr.getReferenceSpace());
+  if (joints) {
+    if (presentingHand(joints)) {
+      hold(joints);
+    }
+    tracker.push({ holdout: { clientFromObject: poseMessage(poseOf(object)), presentingHand: presentingHand(joints, true) } });
+  }
+  const taking = tracker.handAt(poseOf(object));
+  for (const [handedness, taker] of takers) {
+    taker.visible = taking?.handedness === handedness;
+  }
+  if (taking) {
+    poseHand(takers.get(taking.handedness), taking);
+  }
+  renderer.render(scene, camera);
+});

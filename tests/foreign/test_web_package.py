@@ -1,0 +1,203 @@
+"""The web client: its build and unit tests, its README in Node, and its sample pages in a headless Chromium, with emulated hands."""
+
+import base64
+import http.server
+import json
+import os
+import pathlib
+import queue
+import re
+import shutil
+import subprocess
+import tempfile
+import threading
+
+import pytest
+from conftest import ROOT
+
+SOURCES = ROOT / "client/web"
+WORK = ROOT / "target/foreign/web_package"
+PACKAGE = WORK / "client/web"
+PICTURES = WORK / "pictures"
+LONGEST = 120
+JOINTS = [
+    "palm",
+    "wrist",
+    *[f"thumb-{joint}" for joint in ["metacarpal", "phalanx-proximal", "phalanx-distal", "tip"]],
+    *[
+        f"{finger}-finger-{joint}"
+        for finger in ["index", "middle", "ring", "pinky"]
+        for joint in ["metacarpal", "phalanx-proximal", "phalanx-intermediate", "phalanx-distal", "tip"]
+    ],
+]
+
+
+def run(command, folder=PACKAGE, **more):
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LONGEST, **more)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def package():
+    """A copy of the package that is built."""
+    if not (PACKAGE / "node_modules/esbuild").exists():
+        pytest.skip("the web client's packages are not installed")
+    ignored = shutil.ignore_patterns("node_modules", "dist", "gen", "package-lock.json")
+    shutil.copytree(SOURCES, PACKAGE, dirs_exist_ok=True, ignore=ignored)
+    for shared in ["proto", "assets"]:
+        if not (WORK / shared).exists():
+            (WORK / shared).symlink_to(ROOT / shared)
+    PICTURES.mkdir(exist_ok=True)
+    run(["npm", "run", "build"])
+    return PACKAGE
+
+
+def test_unit_tests_pass(package):
+    run(["npm", "test"])
+
+
+def readme_block(language, address, after=""):
+    """The first code block of a language after a text of the README, for the server at an address."""
+    text = (SOURCES / "README.md").read_text()
+    block = re.search(rf"```{language}\n(.*?)```", text[text.index(after) :], re.DOTALL).group(1)
+    return block.replace("http://localhost:50051", f"http://{address}")
+
+
+def test_the_first_call_of_the_readme_runs_in_a_clean_folder(package, address, tmp_path):
+    run(["npm", "pack", "--ignore-scripts", "--pack-destination", tmp_path], package)
+    (tmp_path / "game").mkdir()
+    run(["npm", "init", "-y"], tmp_path / "game")
+    archive = next(tmp_path.glob("*.tgz"))
+    run(["npm", "install", "--prefer-offline", "--no-audit", "--no-fund", archive], tmp_path / "game")
+    first = readme_block("js", address, "## First call")
+    assert len(first.splitlines()) <= 15
+    (tmp_path / "game/find.mjs").write_text(first)
+    out = run(["node", "find.mjs"], tmp_path / "game")
+    assert "index-finger-tip" in out
+
+
+def test_node_calls_streams_and_tracks(package, address):
+    result = json.loads(run(["node", "test/live.mjs", f"http://{address}"], package))
+    assert result["golden"] == "same"
+    assert result["violations"] == ["holdout", "requirements.friction"]
+    assert result["reason"] == "INVALID_REQUEST"
+    assert result["unreachable"] == "Unavailable"
+    scores = result["scores"]
+    assert scores and all(a < b for a, b in zip(scores, scores[1:]))
+    assert result["keyFrames"] == 3
+    tracked = result["tracked"]
+    assert tracked["statuses"][0] == "REPLANNED"
+    assert 0 < tracked["answered"] <= tracked["pushed"]
+    assert tracked["errors"] == []
+    # The hand stays at the object, whatever answers leave out.
+    assert tracked["farthest"] < 1e-5
+    assert tracked["lostHand"] in ["KEPT", "ADJUSTED", "REPLANNED"]
+    assert tracked["afterDeletion"] == "REPLANNED"
+    assert result["meshBytes"] > 10_000
+
+
+class Pages(http.server.SimpleHTTPRequestHandler):
+    """Serves the package's folder, with the observer in each page, and takes what it posts."""
+
+    results = queue.Queue()
+    scripts = ""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments, directory=WORK)
+
+    def do_GET(self):
+        path = pathlib.Path(self.translate_path(self.path))
+        if path.name == "observe.js":
+            self.answer((ROOT / "tests/foreign/web_package/observe.js").read_bytes(), "text/javascript")
+        elif path.suffix == ".html":
+            page = path.read_text()
+            self.answer((Pages.scripts + page).encode(), "text/html")
+        else:
+            super().do_GET()
+
+    def do_POST(self):
+        Pages.results.put(json.loads(self.rfile.read(int(self.headers["content-length"]))))
+        self.answer(b"", "text/plain")
+
+    def answer(self, content, kind):
+        self.send_response(200)
+        self.send_header("content-type", kind)
+        self.send_header("content-length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture(scope="module")
+def show(package, address):
+    """Shows a sample page and returns what the observer saw."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("there is no Chromium")
+
+    def show_page(page, query="", scripts=""):
+        Pages.scripts = f'<!doctype html>{scripts}<script src="/observe.js"></script>'
+        url = f"http://127.0.0.1:{server.server_port}/client/web/examples/{page}?server=http://{address}{query}"
+        options = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--window-size=640,480"]
+        options += ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--remote-debugging-port=0"]
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+            browser = subprocess.Popen(
+                [chromium, *options, f"--user-data-dir={profile}", url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            )
+            try:
+                result = Pages.results.get(timeout=LONGEST)
+            finally:
+                browser.terminate()
+                browser.wait(timeout=20)
+        assert result["failures"] == []
+        picture = base64.b64decode(result["picture"].split(",")[1])
+        (PICTURES / f"{page.removesuffix('.html')}{query.replace('&vrm=/', '-')}.png").write_bytes(picture)
+        # An empty picture of this size has less.
+        assert len(picture) > 5_000
+        return result
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Pages) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield show_page
+        server.shutdown()
+
+
+def distances(hand, bones, name=lambda joint: joint):
+    """How far bones are from the joints of an answer's hand, by the joint's name."""
+    places = {joint: sent["pose"]["position"] for joint, sent in zip(JOINTS, hand["joints"])}
+    return {
+        joint: sum((at.get(axis, 0) - bone) ** 2 for axis, bone in zip("xyz", bones[name(joint)])) ** 0.5
+        for joint, at in places.items()
+        if name(joint) in bones
+    }
+
+
+def test_a_page_poses_a_hand(show):
+    seen = show("hand.html")
+    apart = distances(seen["answer"]["grasps"][0]["hand"], seen["bones"])
+    assert len(apart) == 25
+    assert max(apart.values()) < 1e-3, apart
+
+
+def test_a_page_takes_from_a_tracked_hand(show):
+    emulator = '<script src="/client/web/node_modules/iwer/build/iwer.min.js"></script>'
+    seen = show("webxr.html", scripts=emulator)
+    apart = distances(seen["answer"]["grasp"]["hand"], seen["bones"])
+    assert len(apart) == 25
+    assert max(apart.values()) < 1e-3, apart
+
+
+@pytest.mark.parametrize("version", [0, 1])
+def test_an_avatar_takes_an_object(show, version):
+    run(["node", "-e", f"import('./test/avatar.mjs').then(({{ avatar }}) => fs.writeFileSync('../../avatar{version}.vrm', avatar({version})))"])
+    seen = show("avatar.html", f"&vrm=/avatar{version}.vrm")
+    hand = seen["answer"]["grasps"][0]["hand"]
+    apart = distances(hand, seen["bones"], lambda joint: f"right-{joint}")
+    links = {joint: distance for joint, distance in apart.items() if "phalanx" in joint}
+    assert len(links) == 14
+    assert max(links.values()) < 1e-3, links
+    # The file's tips are inside the skin, on which the rig's are.
+    assert max(apart[joint] for joint in apart if "tip" in joint) < 7e-3, apart
