@@ -79,10 +79,10 @@ def test_the_first_call_of_the_readme_runs_in_a_clean_folder(package, address, t
 
 def test_node_calls_streams_and_tracks(package, address):
     result = json.loads(run(["node", "test/live.mjs", f"http://{address}"], package))
-    assert result["golden"] == "same"
+    assert result["golden"]
     assert result["violations"] == ["holdout", "requirements.friction"]
     assert result["reason"] == "INVALID_REQUEST"
-    assert result["unreachable"] == "Unavailable"
+    assert result["unreachable"] == [[], None]
     scores = result["scores"]
     assert scores and all(a < b for a, b in zip(scores, scores[1:]))
     assert result["keyFrames"] == 3
@@ -93,7 +93,8 @@ def test_node_calls_streams_and_tracks(package, address):
     # The hand stays at the object, whatever answers leave out.
     assert tracked["farthest"] < 1e-5
     assert tracked["lostHand"] in ["KEPT", "ADJUSTED", "REPLANNED"]
-    assert tracked["afterDeletion"] == "REPLANNED"
+    assert tracked["lostWarnings"] > 0
+    assert (tracked["afterDeletion"], tracked["tracks"], tracked["closed"]) == ("KEPT", 2, "TRACK_NOT_FOUND")
     assert result["meshBytes"] > 10_000
 
 
@@ -141,7 +142,7 @@ def show(package, address):
     def show_page(page, query="", scripts=""):
         Pages.scripts = f'<!doctype html>{scripts}<script src="/observe.js"></script>'
         url = f"http://127.0.0.1:{server.server_port}/client/web/examples/{page}?server=http://{address}{query}"
-        options = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--window-size=640,480"]
+        options = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--window-size=640,640"]
         options += ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--remote-debugging-port=0"]
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
             browser = subprocess.Popen(

@@ -37,12 +37,13 @@ if (!grasp) {
 
 const object = (await loader.parseAsync((await downloadMesh(client, OBJECT)).buffer, "")).scene;
 place(object, { position: clientFromObject.position });
-const scene = new Scene().add(vrm.scene, object, new HemisphereLight("white", "gray", 4));
+const scene = new Scene().add(vrm.scene, object, new HemisphereLight("white", "dimgray", 4));
 const camera = new PerspectiveCamera(30, innerWidth / innerHeight, 0.01, 10);
 camera.position.set(x - 1.2, y + 0.2, z + 1.5);
 camera.lookAt(x, y - 0.15, z + 0.2);
 const renderer = new WebGLRenderer({ antialias: true });
 renderer.setSize(innerWidth, innerHeight);
+renderer.setClearColor("lightgray");
 document.body.append(renderer.domElement);
 const timer = new Timer();
 renderer.setAnimationLoop((time) => {

@@ -23,9 +23,10 @@ for (const [handedness, side] of [[Handedness.LEFT, "left"], [Handedness.RIGHT, 
 
 const renderer = new WebGLRenderer({ antialias: true });
 renderer.setSize(innerWidth, innerHeight);
+renderer.setClearColor("lightgray");
 renderer.xr.enabled = true;
 document.body.append(renderer.domElement, VRButton.createButton(renderer, { requiredFeatures: ["hand-tracking"] }));
-const scene = new Scene().add(object, ...takers.values(), new HemisphereLight("white", "gray", 4));
+const scene = new Scene().add(object, ...takers.values(), new HemisphereLight("white", "dimgray", 4));
 const camera = new PerspectiveCamera(60, innerWidth / innerHeight, 0.01, 10);
 const [left, right] = [renderer.xr.getHand(0), renderer.xr.getHand(1)];
 for (const hand of [left, right]) {
@@ -37,7 +38,7 @@ for (const hand of [left, right]) {
 function hold({ joints }) {
   const [wrist, thumb, index] = [joints[0], joints[4], joints[9]].map(({ pose }) => pose);
   place(object, wrist);
-  object.quaternion.multiply({ x: -Math.SQRT1_2, y: 0, z: 0, w: Math.SQRT1_2 });
+  object.rotateX(-Math.PI / 2);
   const grip = new Vector3().addVectors(thumb.position, index.position).divideScalar(2);
   object.position.copy(grip).add(new Vector3(0, 0.07, 0).applyQuaternion(object.quaternion));
 }

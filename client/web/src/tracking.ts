@@ -83,20 +83,28 @@ export class GraspTracker {
   private async send(): Promise<void> {
     while (this.next && this.isOpen) {
       const frame = this.next;
+      const isFirst = !this.name;
       this.next = undefined;
       try {
-        this.name ||= (await this.client.grasps.createTrack(this.grasp?.hand ? { ...this.track, current: this.grasp.hand } : this.track)).name;
+        this.name ||= await this.begin();
         this.sequence += 1n;
         this.take(await this.client.grasps.pushFrame({ ...frame, track: this.name, sequence: this.sequence }));
       } catch (caught) {
         const error = ConnectError.from(caught);
-        if (error.code === Code.NotFound) {
-          // The track ended because no frames came. The next frame begins another.
+        if (error.code === Code.NotFound && !isFirst) {
+          // The track ended because no frames came: this one begins another, with the grasp that is held.
           this.name = "";
+          this.next ??= frame;
+        } else {
+          this.events.onError?.(error);
         }
-        this.events.onError?.(error);
       }
     }
+  }
+
+  private async begin(): Promise<string> {
+    const current = this.grasp?.hand;
+    return (await this.client.grasps.createTrack(current ? { ...this.track, current } : this.track)).name;
   }
 
   private take(answer: TrackAnswer): void {
@@ -112,7 +120,7 @@ export class GraspTracker {
         this.previous = isSameHand ? wasShown : undefined;
         this.changedAt = performance.now();
       }
-      if (changes || before !== status) {
+      if (before !== status || (changes && this.grasp)) {
         this.events.onStatus?.(status, answer.current);
       }
     }

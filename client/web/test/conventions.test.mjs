@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Conversion, Convention, convertGrasp, convertHand, jointsOf } from "@grasp/client";
+import { create } from "@bufbuild/protobuf";
+import { Check, Conversion, Convention, convertGrasp, convertHand, GraspSchema, jointsOf } from "@grasp/client";
 import { assertNear, assertSamePose, vectors } from "./golden.mjs";
 
 const EXACT = 1e-5;
@@ -29,11 +30,19 @@ test("grasps in every convention convert to OpenXR's answer", () => {
       for (const part of expected.arm ? ["clientShoulder", "clientElbow"] : []) {
         assertNear(converted.arm[part], expected.arm[part], EXACT, `${what}, arm`);
       }
-      for (const [index, { value }] of converted.margins.entries()) {
-        assert.ok(Math.abs(value - expected.margins[index].value) < EXACT, what);
-      }
     }
   }
+});
+
+test("margins that are lengths change their unit", () => {
+  const margins = [
+    { check: Check.PENETRATION, value: 0.001, bound: 0.002, where: { x: 1, y: 2, z: 3 } },
+    { check: Check.BALANCE, value: 0.001, bound: 0.02 },
+    { check: Check.GIVER_CLEARANCE },
+  ];
+  const converted = convertGrasp(create(GraspSchema, { hand: { convention: Convention.OPENXR }, margins }), Convention.UNREAL).margins;
+  assert.deepEqual(converted.map(({ value, bound }) => [value, bound]), [[0.1, 0.2], [0.001, 0.02], [undefined, undefined]]);
+  assertNear(converted[0].where, { x: -300, y: 100, z: 200 }, EXACT, "the place");
 });
 
 test("named joints are the same in every convention", () => {

@@ -1,23 +1,22 @@
 // Calls a live server in every way, and prints what came of it: node test/live.mjs URL
 
-import { fromJson, toJson } from "@bufbuild/protobuf";
-import { Code, ConnectError } from "@connectrpc/connect";
-import { createGraspClient, CurrentGraspStatus, downloadMesh, FindGraspResponseSchema, GraspTracker, HandJointsSchema, handAt, presentingHand, reason, violations } from "@grasp/client";
-import { vectors } from "./golden.mjs";
+import { create } from "@bufbuild/protobuf";
+import { createGraspClient, CurrentGraspStatus, downloadMesh, GraspTracker, handAt, Handedness, HandJointsSchema, presentingHand, reason, violations } from "@grasp/client";
+import { assertSamePose, vectors } from "./golden.mjs";
 
 const client = createGraspClient(process.argv[2]);
 const HOLDOUT = { object: "objects/remote" };
 const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
 const result = {};
 
-// The golden answer, but for its report.
-const { request, response } = vectors[0].conventions[1];
-const { outcome, grasps } = await client.grasps.findGrasp(request);
-const text = (answer) => JSON.stringify(toJson(FindGraspResponseSchema, fromJson(FindGraspResponseSchema, answer)));
-const [asked, kept] = [{ outcome, grasps }, { outcome: response.outcome, grasps: response.grasps }].map((answer) =>
-  text(toJson(FindGraspResponseSchema, { $typeName: "grasp.v1.FindGraspResponse", ...answer })),
-);
-result.golden = asked === kept ? "same" : `${asked}\n${kept}`;
+// The golden answer: its figures to the last digit that is written.
+const { request, grasp: golden } = vectors[0].conventions[1];
+const [found] = (await client.grasps.findGrasp(request)).grasps;
+assertSamePose(found.hand.objectFromWrist, golden.hand.objectFromWrist, 1e-6, 1e-5, "the wrist");
+for (const [index, { pose }] of found.hand.joints.entries()) {
+  assertSamePose(pose, golden.hand.joints[index].pose, 1e-6, 1e-5, `joint ${index}`);
+}
+result.golden = found.contacts.length === golden.contacts.length && Buffer.compare(found.packed, golden.packed) === 0;
 
 try {
   await client.grasps.findGrasp({ requirements: { friction: -1 } });
@@ -28,7 +27,7 @@ try {
 try {
   await createGraspClient("http://127.0.0.1:9").grasps.findGrasp({ holdout: HOLDOUT });
 } catch (error) {
-  result.unreachable = violations(error).length === 0 && Code[ConnectError.from(error).code];
+  result.unreachable = [violations(error), reason(error) ?? null];
 }
 
 result.scores = [];
@@ -45,7 +44,13 @@ console.log(JSON.stringify(result));
 async function track() {
   const tracked = { statuses: [], pushed: 0, answered: 0, errors: [], farthest: 0 };
   let last;
-  const tracker = new GraspTracker(client, { holdout: HOLDOUT, output: { changesOnly: true } }, {
+  const names = [];
+  const createTrack = async (request) => {
+    const track = await client.grasps.createTrack(request);
+    names.push(track.name);
+    return track;
+  };
+  const tracker = new GraspTracker({ ...client, grasps: { ...client.grasps, createTrack } }, { holdout: HOLDOUT, output: { changesOnly: true } }, {
     onStatus: (status) => tracked.statuses.push(CurrentGraspStatus[status]),
     onAnswer: (answer) => (last = answer),
     onError: (error) => tracked.errors.push(error.message),
@@ -76,18 +81,28 @@ async function track() {
   tracked.farthest = Math.max(tracked.farthest, Math.abs(drawn.joints[9].pose.position.x - expected.joints[9].pose.position.x));
 
   // A giver's hand that was there is lost: it is taken where it was.
-  const present = await client.grasps.findGrasp({ holdout: HOLDOUT, receiver: { handedness: 2 } });
+  const present = await client.grasps.findGrasp({ holdout: HOLDOUT, receiver: { handedness: Handedness.RIGHT } });
   const giver = handAt(present.grasps[0].hand, object(60));
-  const joints = { ...fromJson(HandJointsSchema, { handedness: "HANDEDNESS_RIGHT" }), joints: giver.joints };
+  const joints = create(HandJointsSchema, { handedness: Handedness.RIGHT, joints: giver.joints });
   tracker.push({ holdout: { clientFromObject: object(60), presentingHand: presentingHand(joints) } });
   await answered();
   const lost = { ...joints, joints: joints.joints.map((joint, index) => (index % 3 === 0 ? { ...joint, pose: undefined, radius: 0 } : joint)) };
   tracker.push({ holdout: { clientFromObject: object(60), presentingHand: presentingHand(lost, true) } });
   await answered();
   tracked.lostHand = CurrentGraspStatus[tracker.status];
-  tracked.lostWarnings = last.warnings;
+  tracked.lostWarnings = last.warnings.length;
 
-  // A track that ended is begun again, with the grasp that was held.
+  // A track that the server ended is begun again, with the grasp that was held.
+  await client.grasps.deleteTrack({ name: names[0] });
+  tracker.push({ holdout: { clientFromObject: object(60) } });
+  await answered();
+  tracked.afterDeletion = CurrentGraspStatus[tracker.status];
+  tracked.tracks = names.length;
   await tracker.close();
+  try {
+    await client.grasps.deleteTrack({ name: names[1] });
+  } catch (error) {
+    tracked.closed = reason(error);
+  }
   return tracked;
 }

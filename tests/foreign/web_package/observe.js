@@ -32,7 +32,14 @@ globalThis.fetch = async (input, init) => {
   return response;
 };
 
-const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
+const LONGEST = 60_000;
+
+function pause(milliseconds) {
+  if (performance.now() > LONGEST) {
+    throw new Error(`the page took too long: ${JSON.stringify({ ...shown, scenes: shown.scenes.length, renderer: !!shown.renderer, bones: bones() })}`);
+  }
+  return new Promise((done) => setTimeout(done, milliseconds));
+}
 
 function bones() {
   const places = {};
@@ -89,4 +96,5 @@ async function watch() {
   return { answer: shown.answer, bones: bones(), picture: shown.picture, failures };
 }
 
-watch().then((result) => fetchAll("/result", { method: "POST", body: JSON.stringify(result) }));
+const report = (result) => fetchAll("/result", { method: "POST", body: JSON.stringify(result) });
+watch().then(report, (error) => report({ failures: [...failures, String(error)] }));
