@@ -15,7 +15,10 @@ const file = await (await fetch(query.get("vrm") ?? "avatar.vrm")).arrayBuffer()
 const { vrm } = (await loader.parseAsync(file.slice(), "")).userData;
 VRMUtils.rotateVRM0(vrm);
 vrm.scene.traverse((part) => (part.frustumCulled = false));
-for (const [side, sign] of [["left", -1], ["right", 1]]) {
+for (const [side, sign] of [
+  ["left", -1],
+  ["right", 1],
+]) {
   vrm.humanoid.getNormalizedBoneNode(`${side}UpperArm`).rotation.z = 1.3 * sign * (vrm.meta.metaVersion === "0" ? -1 : 1);
 }
 
@@ -25,12 +28,14 @@ const id = Array.from(hash, (byte) => byte.toString(16).padStart(2, "0")).join("
 const rig = await createRigOnce(client, `avatar-${id}`, new Uint8Array(file));
 const arm = new VrmArm(vrm, rig, Handedness.RIGHT);
 
-// In front of the shoulder, within reach, upright.
+// In front of the chest, within reach, upright.
 const { receiver } = arm;
-const { x, y, z } = receiver.body.value;
+const { y, z } = receiver.body.value;
 const reach = receiver.upperArmLength + receiver.forearmLength;
-const clientFromObject = { position: { x, y: y - 0.3 * reach, z: z + 0.85 * reach } };
-const { grasps: [grasp] } = await client.grasps.findGrasp({ holdout: { object: OBJECT, clientFromObject }, receiver, output: { keyFrames: true } });
+const clientFromObject = { position: { x: 0, y: y - 0.3 * reach, z: z + 0.85 * reach } };
+const {
+  grasps: [grasp],
+} = await client.grasps.findGrasp({ holdout: { object: OBJECT, clientFromObject }, receiver, output: { keyFrames: true } });
 if (!grasp) {
   throw new Error("No grasp was found in time.");
 }
@@ -39,8 +44,8 @@ const object = (await loader.parseAsync((await downloadMesh(client, OBJECT)).buf
 place(object, { position: clientFromObject.position });
 const scene = new Scene().add(vrm.scene, object, new HemisphereLight("white", "dimgray", 4));
 const camera = new PerspectiveCamera(30, innerWidth / innerHeight, 0.01, 10);
-camera.position.set(x - 1.2, y + 0.2, z + 1.5);
-camera.lookAt(x, y - 0.15, z + 0.2);
+camera.position.set(-0.9, y + 0.1, z + 1.4);
+camera.lookAt(-0.1, y - 0.15, z + 0.2);
 const renderer = new WebGLRenderer({ antialias: true });
 renderer.setSize(innerWidth, innerHeight);
 renderer.setClearColor("lightgray");

@@ -4,20 +4,36 @@ import { HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } fro
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { VRButton } from "three/addons/webxr/VRButton.js";
 import { XRHandModelFactory } from "three/addons/webxr/XRHandModelFactory.js";
-import { createGraspClient, CurrentGraspStatus, downloadMesh, GraspTracker, Handedness, poseMessage, presentingHand, trackedJoints } from "@grasp/client";
+import {
+  createGraspClient,
+  CurrentGraspStatus,
+  downloadMesh,
+  GraspTracker,
+  Handedness,
+  poseMessage,
+  presentingHand,
+  trackedJoints,
+} from "@grasp/client";
 import { place, poseHand, poseOf } from "@grasp/client/three";
 
 const OBJECT = "objects/remote";
 const client = createGraspClient(new URLSearchParams(location.search).get("server") ?? "http://localhost:50051");
-const tracker = new GraspTracker(client, { holdout: { object: OBJECT }, mayChangeHand: true }, {
-  onStatus: (status) => console.log(CurrentGraspStatus[status]),
-  onError: (error) => console.error(error.message),
-});
+const tracker = new GraspTracker(
+  client,
+  { holdout: { object: OBJECT }, mayChangeHand: true },
+  {
+    onStatus: (status) => console.log(CurrentGraspStatus[status]),
+    onError: (error) => console.error(error.message),
+  },
+);
 
 const loader = new GLTFLoader();
 const object = (await loader.parseAsync((await downloadMesh(client, OBJECT)).buffer, "")).scene;
 const takers = new Map();
-for (const [handedness, side] of [[Handedness.LEFT, "left"], [Handedness.RIGHT, "right"]]) {
+for (const [handedness, side] of [
+  [Handedness.LEFT, "left"],
+  [Handedness.RIGHT, "right"],
+]) {
   takers.set(handedness, (await loader.loadAsync(`../../../assets/hands/adult_${side}.glb`)).scene);
 }
 

@@ -1,7 +1,16 @@
 /** Packed grasps, which players send to each other, and the joints of their hands. */
 
 import { create } from "@bufbuild/protobuf";
-import { DigitAnglesSchema, Digit, Handedness, HandPoseSchema, JointPoseSchema, type DigitAngles, type HandPose, type JointPose } from "./gen/grasp/v1/holdout_pb.js";
+import {
+  DigitAnglesSchema,
+  Digit,
+  Handedness,
+  HandPoseSchema,
+  JointPoseSchema,
+  type DigitAngles,
+  type HandPose,
+  type JointPose,
+} from "./gen/grasp/v1/holdout_pb.js";
 import type { GraspType } from "./gen/grasp/v1/grasp_type_pb.js";
 import type { DigitLimits, HandRig } from "./gen/grasp/v1/hand_rig_service_pb.js";
 import { Conversion } from "./conventions.js";
@@ -44,7 +53,14 @@ export function decodePacked(packed: Uint8Array): PackedGrasp {
   let at = idEnd;
   for (const [index, digit] of DIGITS.entries()) {
     if (present & (2 << index)) {
-      const [a, b, c, d, e, f] = [0, 1, 2, 3, 4, 5].map((byte) => data.getUint8(at + byte)) as [number, number, number, number, number, number];
+      const [a, b, c, d, e, f] = [0, 1, 2, 3, 4, 5].map((byte) => data.getUint8(at + byte)) as [
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+      ];
       const values = [a | ((b & 15) << 8), (b >> 4) | (c << 4), d | ((e & 15) << 8), (e >> 4) | (f << 4)];
       const angles = values.map((value) => ((value - 2048) * Math.PI) / 2048) as [number, number, number, number];
       const [baseYaw, basePitch, secondPitch, thirdPitch] = angles;
@@ -73,7 +89,13 @@ export function withJoints(hand: HandPose, rig: HandRig, clientFromObject: Rigid
   for (const [index, digit] of DIGITS.entries()) {
     const angles = hand[digit];
     if (angles) {
-      poseDigit(posed, index, angles, side.limits.find((limits) => limits.digit === index + 1), hand.handedness);
+      poseDigit(
+        posed,
+        index,
+        angles,
+        side.limits.find((limits) => limits.digit === index + 1),
+        hand.handedness,
+      );
     }
   }
   const joints = JOINT_NAMES.map((_, place): JointPose => {
@@ -95,7 +117,13 @@ function stretched(limits: DigitLimits | undefined, angle: "baseYaw" | "basePitc
 }
 
 /** Bends the joints of a digit, in the wrist's frame and OpenXR's axes, from stretched to its angles. */
-function poseDigit(joints: (Rigid | undefined)[], digit: number, angles: DigitAngles, limits: DigitLimits | undefined, side: Handedness): void {
+function poseDigit(
+  joints: (Rigid | undefined)[],
+  digit: number,
+  angles: DigitAngles,
+  limits: DigitLimits | undefined,
+  side: Handedness,
+): void {
   // The three links and the tip; a finger's metacarpal does not move.
   const [first, second, third, tip] = DIGIT_JOINTS[digit]!.slice(-4) as [number, number, number, number];
   const links = [first, second, third, tip].flatMap((joint) => joints[joint] ?? []);

@@ -102,5 +102,8 @@ export function rigid(pose: Pose | undefined): Rigid {
 /** The message of a transform. */
 export function poseMessage({ position, orientation }: Rigid): Pose {
   const { x, y, z } = position;
-  return create(PoseSchema, { position: { x, y, z }, orientation: { x: orientation.x, y: orientation.y, z: orientation.z, w: orientation.w } });
+  return create(PoseSchema, {
+    position: { x, y, z },
+    orientation: { x: orientation.x, y: orientation.y, z: orientation.z, w: orientation.w },
+  });
 }

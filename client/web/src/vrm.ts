@@ -59,7 +59,11 @@ export class VrmArm {
     if (!stretched) {
       throw new Error(`${rig.name} lacks the hand`);
     }
-    [this.upperArm, this.lowerArm, this.hand] = ["UpperArm", "LowerArm", "Hand"].map((part) => this.bone(part)) as [Object3D, Object3D, Object3D];
+    [this.upperArm, this.lowerArm, this.hand] = ["UpperArm", "LowerArm", "Hand"].map((part) => this.bone(part)) as [
+      Object3D,
+      Object3D,
+      Object3D,
+    ];
     const [shoulder, elbow, wrist] = ["UpperArm", "LowerArm", "Hand"].map((part) => this.rest(part)!) as [Vector3, Vector3, Vector3];
     this.upperRest = elbow.clone().sub(shoulder);
     this.lowerRest = wrist.clone().sub(elbow);

@@ -1,7 +1,15 @@
 /** Hands that a headset tracks, for requests. */
 
 import { create } from "@bufbuild/protobuf";
-import { Handedness, HandJointsSchema, JointPoseSchema, PresentingHandSchema, type HandJoints, type JointPose, type PresentingHand } from "./gen/grasp/v1/holdout_pb.js";
+import {
+  Handedness,
+  HandJointsSchema,
+  JointPoseSchema,
+  PresentingHandSchema,
+  type HandJoints,
+  type JointPose,
+  type PresentingHand,
+} from "./gen/grasp/v1/holdout_pb.js";
 import { poseMessage } from "./pose.js";
 
 /**

@@ -44,8 +44,21 @@ function readGlb(path) {
 
 // The bytes of a VRM of version 0 or 1.
 export function avatar(version) {
-  const json = { asset: { version: "2.0" }, scene: 0, scenes: [{ nodes: [] }], nodes: [], meshes: [], skins: [], accessors: [], bufferViews: [], materials: [] };
-  for (const baseColorFactor of [[0.85, 0.62, 0.5, 1], [0.25, 0.42, 0.7, 1]]) {
+  const json = {
+    asset: { version: "2.0" },
+    scene: 0,
+    scenes: [{ nodes: [] }],
+    nodes: [],
+    meshes: [],
+    skins: [],
+    accessors: [],
+    bufferViews: [],
+    materials: [],
+  };
+  for (const baseColorFactor of [
+    [0.85, 0.62, 0.5, 1],
+    [0.25, 0.42, 0.7, 1],
+  ]) {
     json.materials.push({ pbrMetallicRoughness: { baseColorFactor, metallicFactor: 0, roughnessFactor: 0.8 } });
   }
   const pieces = [];
@@ -114,7 +127,9 @@ export function avatar(version) {
       return json.accessors.length - 1;
     });
     const wrist = hand.nodes.findIndex(({ name }) => name === "wrist");
-    const nodeOf = hand.nodes.map((node, index) => (index === wrist ? bones[`${side}Hand`] : json.nodes.push({ name: `${side}-${node.name}` }) - 1));
+    const nodeOf = hand.nodes.map((node, index) =>
+      index === wrist ? bones[`${side}Hand`] : json.nodes.push({ name: `${side}-${node.name}` }) - 1,
+    );
     for (const [index, { translation, rotation, children = [] }] of hand.nodes.entries()) {
       const node = json.nodes[nodeOf[index]];
       node.children = [...(node.children ?? []), ...children.map((child) => nodeOf[child])];
@@ -153,7 +168,12 @@ export function avatar(version) {
 
 function sidesOf(bone) {
   const isPaired = bone[0] === bone[0].toUpperCase();
-  return isPaired ? [["left", 1], ["right", -1]] : [["", 1]];
+  return isPaired
+    ? [
+        ["left", 1],
+        ["right", -1],
+      ]
+    : [["", 1]];
 }
 
 function vrm0(bones) {

@@ -41,7 +41,14 @@ test("margins that are lengths change their unit", () => {
     { check: Check.GIVER_CLEARANCE },
   ];
   const converted = convertGrasp(create(GraspSchema, { hand: { convention: Convention.OPENXR }, margins }), Convention.UNREAL).margins;
-  assert.deepEqual(converted.map(({ value, bound }) => [value, bound]), [[0.1, 0.2], [0.001, 0.02], [undefined, undefined]]);
+  assert.deepEqual(
+    converted.map(({ value, bound }) => [value, bound]),
+    [
+      [0.1, 0.2],
+      [0.001, 0.02],
+      [undefined, undefined],
+    ],
+  );
   assertNear(converted[0].where, { x: -300, y: 100, z: 200 }, EXACT, "the place");
 });
 
@@ -75,14 +82,20 @@ test("conversions there and back change nothing, importers' axes included", () =
 
 test("an object's point keeps its place in the client's frame, importers' axes included", () => {
   const object = { position: { x: 1, y: 2, z: 3 }, orientation: { x: 0.5, y: 0.5, z: -0.5, w: 0.5 } };
-  const [point, moved] = [{ x: 0.1, y: 0.2, z: 0.3 }, { x: 1.2, y: 1.7, z: 2.9 }];
+  const [point, moved] = [
+    { x: 0.1, y: 0.2, z: 0.3 },
+    { x: 1.2, y: 1.7, z: 2.9 },
+  ];
   for (const convention of [1, 2, 3, 4, 5, 6]) {
     const conversion = new Conversion(convention);
     const { position, orientation: q } = conversion.objectFromOpenXr(object);
     const p = conversion.pointAtObjectFromOpenXr(point);
     // Rotation by a quaternion, written out as v + 2 u x (u x v + w v).
     const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    const [u, v] = [[q.x, q.y, q.z], [p.x, p.y, p.z]];
+    const [u, v] = [
+      [q.x, q.y, q.z],
+      [p.x, p.y, p.z],
+    ];
     const t = cross(u, v).map((c, i) => c + q.w * v[i]);
     const [x, y, z] = cross(u, t).map((c, i) => v[i] + 2 * c + [position.x, position.y, position.z][i]);
     assertNear(conversion.pointToOpenXr({ x, y, z }), moved, 1e-6, Convention[convention]);

@@ -9,7 +9,10 @@ const ANGLES = ["baseYaw", "basePitch", "secondPitch", "thirdPitch"];
 
 // The grasp's hand with its angles multiplied and its wrist drawn back.
 function opened(hand, rig, clientFromObject, share, back) {
-  const digits = DIGITS.map((digit) => [digit, { ...hand[digit], ...Object.fromEntries(ANGLES.map((angle) => [angle, share * hand[digit][angle]])) }]);
+  const digits = DIGITS.map((digit) => [
+    digit,
+    { ...hand[digit], ...Object.fromEntries(ANGLES.map((angle) => [angle, share * hand[digit][angle]])) },
+  ]);
   const { position, orientation } = hand.objectFromWrist;
   const objectFromWrist = poseMessage({ position: { x: position.x, y: position.y + back, z: position.z }, orientation });
   return withJoints({ ...hand, ...Object.fromEntries(digits), objectFromWrist }, rig, clientFromObject);
@@ -34,7 +37,13 @@ function motions() {
 
 test("key frames play from the first to the grasp", () => {
   for (const { grasp, unit } of motions()) {
-    for (const [t, index] of [[-1, 0], [0, 0], [0.5, 1], [1, 2], [7, 2]]) {
+    for (const [t, index] of [
+      [-1, 0],
+      [0, 0],
+      [0.5, 1],
+      [1, 2],
+      [7, 2],
+    ]) {
       const [played, expected] = [playKeyFrames(grasp, t), grasp.keyFrames[index].hand];
       for (const joint of played.joints.keys()) {
         assertSamePose(played.joints[joint].pose, expected.joints[joint].pose, 1e-5 * unit, 1e-4, `joint ${joint} at ${t}`);
@@ -45,7 +54,11 @@ test("key frames play from the first to the grasp", () => {
 
 test("between key frames wrists go straight, and joints are where the angles put them", () => {
   for (const { grasp, at, unit } of motions()) {
-    for (const [t, share, back] of [[0.25, 0.4, 0.05], [0.6, 0.52, 0], [0.75, 0.7, 0]]) {
+    for (const [t, share, back] of [
+      [0.25, 0.4, 0.05],
+      [0.6, 0.52, 0],
+      [0.75, 0.7, 0],
+    ]) {
       const [played, expected] = [playKeyFrames(grasp, t), at(share, back * unit)];
       assertSamePose(played.objectFromWrist, expected.objectFromWrist, 1e-5 * unit, 1e-4, `the wrist at ${t}`);
       assertSamePose(played.clientFromWrist, expected.clientFromWrist, 1e-5 * unit, 1e-4, `the wrist at ${t}`);

@@ -1,7 +1,18 @@
 // Calls a live server in every way, and prints what came of it: node test/live.mjs URL
 
 import { create } from "@bufbuild/protobuf";
-import { createGraspClient, CurrentGraspStatus, downloadMesh, GraspTracker, handAt, Handedness, HandJointsSchema, presentingHand, reason, violations } from "@grasp/client";
+import {
+  createGraspClient,
+  CurrentGraspStatus,
+  downloadMesh,
+  GraspTracker,
+  handAt,
+  Handedness,
+  HandJointsSchema,
+  presentingHand,
+  reason,
+  violations,
+} from "@grasp/client";
 import { assertSamePose, vectors } from "./golden.mjs";
 
 const client = createGraspClient(process.argv[2]);
@@ -50,13 +61,17 @@ async function track() {
     names.push(track.name);
     return track;
   };
-  const tracker = new GraspTracker({ ...client, grasps: { ...client.grasps, createTrack } }, { holdout: HOLDOUT, output: { changesOnly: true } }, {
-    onStatus: (status) => tracked.statuses.push(CurrentGraspStatus[status]),
-    onAnswer: (answer) => (last = answer),
-    onError: (error) => tracked.errors.push(error.message),
-  });
+  const tracker = new GraspTracker(
+    { ...client, grasps: { ...client.grasps, createTrack } },
+    { holdout: HOLDOUT, output: { changesOnly: true } },
+    {
+      onStatus: (status) => tracked.statuses.push(CurrentGraspStatus[status]),
+      onAnswer: (answer) => (last = answer),
+      onError: (error) => tracked.errors.push(error.message),
+    },
+  );
   const answered = async () => {
-    for (last = undefined; !last; ) {
+    for (last = undefined; !last;) {
       await pause(5);
     }
   };
@@ -71,7 +86,10 @@ async function track() {
       const { hand } = tracker.grasp;
       // The grasp is whole, at the object of its frame.
       const wrist = hand.joints[1].pose.position;
-      tracked.farthest = Math.max(tracked.farthest, ...["x", "y", "z"].map((axis) => Math.abs(wrist[axis] - hand.clientFromWrist.position[axis])));
+      tracked.farthest = Math.max(
+        tracked.farthest,
+        ...["x", "y", "z"].map((axis) => Math.abs(wrist[axis] - hand.clientFromWrist.position[axis])),
+      );
     }
   }
   await answered();
@@ -86,7 +104,10 @@ async function track() {
   const joints = create(HandJointsSchema, { handedness: Handedness.RIGHT, joints: giver.joints });
   tracker.push({ holdout: { clientFromObject: object(60), presentingHand: presentingHand(joints) } });
   await answered();
-  const lost = { ...joints, joints: joints.joints.map((joint, index) => (index % 3 === 0 ? { ...joint, pose: undefined, radius: 0 } : joint)) };
+  const lost = {
+    ...joints,
+    joints: joints.joints.map((joint, index) => (index % 3 === 0 ? { ...joint, pose: undefined, radius: 0 } : joint)),
+  };
   tracker.push({ holdout: { clientFromObject: object(60), presentingHand: presentingHand(lost, true) } });
   await answered();
   tracked.lostHand = CurrentGraspStatus[tracker.status];

@@ -14,9 +14,12 @@ import { assertNear, assertSamePose, rigs, vectors } from "./golden.mjs";
 // Browsers have it; the loader asks for it.
 globalThis.self = globalThis;
 
-const load = (bytes, loader = new GLTFLoader()) => loader.parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), "");
+const load = (bytes, loader = new GLTFLoader()) =>
+  loader.parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), "");
 const hands = await Promise.all(
-  ["left", "right"].map(async (side) => (await load(readFileSync(new URL(`../../../assets/hands/adult_${side}.glb`, import.meta.url)))).scene),
+  ["left", "right"].map(
+    async (side) => (await load(readFileSync(new URL(`../../../assets/hands/adult_${side}.glb`, import.meta.url)))).scene,
+  ),
 );
 const spot = { position: { x: 0.3, y: -0.2, z: 1 }, orientation: { x: 0.5, y: 0.5, z: -0.5, w: 0.5 } };
 
@@ -91,7 +94,10 @@ for (const version of [0, 1]) {
       for (const { grasp } of poses) {
         // Brings the object within reach.
         const space = new Object3D();
-        space.position.copy(shoulder).add(new Vector3(0, -0.15, 0.3)).sub(jointsOf(grasp.hand)[1].pose.position);
+        space.position
+          .copy(shoulder)
+          .add(new Vector3(0, -0.15, 0.3))
+          .sub(jointsOf(grasp.hand)[1].pose.position);
         const reaching = new VrmArm(vrm, rigs.get("rigs/adult"), handedness, space);
         assert.ok(reaching.pose(grasp.hand) < 1e-6);
         vrm.update(0.01);

@@ -36,7 +36,9 @@ const LONGEST = 60_000;
 
 function pause(milliseconds) {
   if (performance.now() > LONGEST) {
-    throw new Error(`the page took too long: ${JSON.stringify({ ...shown, scenes: shown.scenes.length, renderer: !!shown.renderer, bones: bones() })}`);
+    throw new Error(
+      `the page took too long: ${JSON.stringify({ ...shown, scenes: shown.scenes.length, renderer: !!shown.renderer, bones: bones() })}`,
+    );
   }
   return new Promise((done) => setTimeout(done, milliseconds));
 }
@@ -65,8 +67,9 @@ async function giveByHand() {
   device.hands.left.connected = false;
   device.hands.right.poseId = "pinch";
   device.hands.right.updateHandPose?.(1);
-  device.position.set(0, 1.45, 0.05);
-  device.quaternion.set(-0.17, 0, 0, 0.985);
+  device.fovy = 0.5;
+  device.position.set(0.25, 1.45, 0.05);
+  device.quaternion.set(-0.17, 0.2, 0.03, 0.965);
   device.hands.right.position.set(0.05, 1.25, -0.4);
   while (!document.querySelector("#VRButton")?.onclick && failures.length === 0) {
     await pause(50);
