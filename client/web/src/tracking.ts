@@ -2,7 +2,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import type { GraspClient } from "./client.js";
+import { retryDelay, type GraspClient } from "./client.js";
 import { CurrentGraspStatus, type CurrentGraspReport, type Grasp } from "./gen/grasp/v1/grasp_pb.js";
 import type { HandPose } from "./gen/grasp/v1/holdout_pb.js";
 import type { TrackAnswer, TrackFrame, TrackFrameSchema, TrackSchema } from "./gen/grasp/v1/track_pb.js";
@@ -25,6 +25,9 @@ export interface TrackerEvents {
 
 /** How long the hand takes from one grasp to the next, in milliseconds. */
 const CHANGE_TIME = 150;
+
+/** How long no frame is sent after an error, in milliseconds, unless the server says. */
+const PAUSE = 250;
 
 /**
  * A giver who is tracked. Push a frame whenever poses change, and draw `handAt` the object in each picture: one frame is on its way at a
@@ -97,6 +100,8 @@ export class GraspTracker {
           this.next ??= frame;
         } else {
           this.events.onError?.(error);
+          // A server that is away or busy is not asked for every picture.
+          await new Promise((done) => setTimeout(done, retryDelay(error) ?? PAUSE));
         }
       }
     }

@@ -42,8 +42,8 @@ function readGlb(path) {
   return { json: JSON.parse(file.subarray(20, 20 + length)), bin: file.subarray(28 + length) };
 }
 
-// The bytes of a VRM of version 0 or 1.
-export function avatar(version) {
+// The bytes of a VRM of version 0 or 1, whose humanoid names the fingers' bones or not.
+export function avatar(version, hasFingers = true) {
   const json = {
     asset: { version: "2.0" },
     scene: 0,
@@ -156,6 +156,9 @@ export function avatar(version) {
     const skinned = hand.nodes.findIndex(({ mesh }) => mesh !== undefined);
     Object.assign(json.nodes[nodeOf[skinned]], { mesh: json.meshes.length - 1, skin: json.skins.length - 1 });
     json.scenes[0].nodes.push(nodeOf[skinned]);
+    if (!hasFingers) {
+      return;
+    }
     const nodeNamed = (name) => nodeOf[hand.nodes.findIndex((node) => node.name === name)];
     THUMB.forEach((joint, link) => (bones[`${side}Thumb${THUMB_BONES[version][link]}`] = nodeNamed(`thumb-${joint}`)));
     for (const [finger, prefix] of Object.entries(FINGERS)) {

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { VRMLoaderPlugin, VRMUtils } from "@pixiv/three-vrm";
-import { Group, Object3D, Vector3 } from "three";
+import { Group, Object3D, Quaternion, Vector3 } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { create } from "@bufbuild/protobuf";
 import { Convention, convertHand, Handedness, HandPoseSchema, jointsOf, poseMessage } from "@grasp/client";
@@ -112,3 +112,19 @@ for (const version of [0, 1]) {
     }
   });
 }
+
+test("an avatar without fingers turns its hand alike", async () => {
+  const loader = () => new GLTFLoader().register((parser) => new VRMLoaderPlugin(parser));
+  for (const handedness of [Handedness.LEFT, Handedness.RIGHT]) {
+    const { grasp } = vectors.map(({ conventions }) => conventions[0]).find(({ grasp }) => grasp.hand.handedness === handedness);
+    const turns = [];
+    for (const hasFingers of [true, false]) {
+      const { vrm } = (await load(avatar(1, hasFingers), loader())).userData;
+      new VrmArm(vrm, rigs.get("rigs/adult"), handedness).pose(grasp.hand, grasp.arm);
+      vrm.update(0.01);
+      const hand = vrm.humanoid.getRawBoneNode(handedness === Handedness.LEFT ? "leftHand" : "rightHand");
+      turns.push(hand.getWorldQuaternion(new Quaternion()));
+    }
+    assert.ok(turns[0].angleTo(turns[1]) < 0.15);
+  }
+});
