@@ -181,6 +181,28 @@ def distances(hand, bones, name=lambda joint: joint):
     }
 
 
+def contact_distances(grasp, bones):
+    """How far the digits' contacts are from the skin of the avatar's bones. The object is upright."""
+    hand = grasp["hand"]
+    wrist, at_object = hand["clientFromWrist"]["position"], hand["objectFromWrist"]["position"]
+    distances = []
+    for contact in grasp["contacts"]:
+        if "digit" not in contact:
+            continue
+        point = [wrist[axis] - at_object[axis] + contact["position"].get(axis, 0) for axis in "xyz"]
+        finger = contact["digit"].removeprefix("DIGIT_").lower().replace("little", "pinky")
+        names = [joint for joint in JOINTS if joint.startswith(finger)][-4:][contact["phalanx"] - 1 :][:2]
+        start, end = [bones[f"right-{name}"] for name in names]
+        radii = [hand["joints"][JOINTS.index(name)]["radius"] for name in names]
+        along = [b - a for a, b in zip(start, end)]
+        share = sum(d * (p - a) for d, p, a in zip(along, point, start)) / sum(d * d for d in along)
+        share = min(1, max(0, share))
+        near = [a + share * d for a, d in zip(start, along)]
+        radius = radii[0] + share * (radii[1] - radii[0])
+        distances.append(abs(sum((p - n) ** 2 for p, n in zip(point, near)) ** 0.5 - radius))
+    return distances
+
+
 def test_a_page_poses_a_hand(show):
     seen = show("hand.html")
     apart = distances(seen["answer"]["grasps"][0]["hand"], seen["bones"])
@@ -205,5 +227,8 @@ def test_an_avatar_takes_an_object(show, version):
     links = {joint: distance for joint, distance in apart.items() if "phalanx" in joint}
     assert len(links) == 14
     assert max(links.values()) < 1e-3, links
+    touching = contact_distances(seen["answer"]["grasps"][0], seen["bones"])
+    assert len(touching) > 1
+    assert all(distance < 0.004 for distance in touching), touching
     # The file's tips are inside the skin, on which the rig's are.
     assert max(apart[joint] for joint in apart if "tip" in joint) < 7e-3, apart

@@ -53,8 +53,8 @@ document.body.append(renderer.domElement);
 const timer = new Timer();
 renderer.setAnimationLoop((time) => {
   timer.update(time);
-  // A second of motion, then one at rest.
-  arm.pose(playKeyFrames(grasp, timer.getElapsed() % 2), grasp.arm);
+  // A second of motion, then two at rest.
+  arm.pose(playKeyFrames(grasp, timer.getElapsed() % 3), grasp.arm);
   vrm.update(timer.getDelta());
   renderer.render(scene, camera);
 });

@@ -1,7 +1,9 @@
 // Watches a sample page from the outside: tells the page's server where the bones of the visible hands are once they rest, with the last
 // grasp that was answered, and a picture.
 
-const shown = { scenes: [], renderer: null, answer: null, picture: null };
+const shown = { scenes: [], answer: null, awaited: 1, before: "", resting: 0, picture: null, bones: null };
+// Pictures in a row without a change.
+const RESTING = 3;
 
 // three announces scenes and renderers to its developer tools.
 globalThis.__THREE_DEVTOOLS__ = new EventTarget();
@@ -9,16 +11,24 @@ __THREE_DEVTOOLS__.addEventListener("observe", ({ detail }) => {
   if (detail.isScene) {
     shown.scenes.push(detail);
   } else if (detail.domElement) {
-    shown.renderer = detail;
     const render = detail.render.bind(detail);
     detail.render = (...all) => {
       render(...all);
-      if (shown.picture === "wanted") {
-        shown.picture = detail.domElement.toDataURL("image/png");
-      }
+      drawn(detail.domElement);
     };
   }
 });
+
+function drawn(canvas) {
+  const places = bones();
+  const now = JSON.stringify(places);
+  shown.resting = shown.awaited <= 0 && now !== "{}" && now === shown.before ? shown.resting + 1 : 0;
+  shown.before = now;
+  if (shown.resting === RESTING) {
+    shown.picture ??= canvas.toDataURL("image/png");
+    shown.bones ??= places;
+  }
+}
 
 const fetchAll = globalThis.fetch;
 globalThis.fetch = async (input, init) => {
@@ -27,6 +37,7 @@ globalThis.fetch = async (input, init) => {
     const answer = await response.clone().json();
     if (answer.grasp || answer.grasps) {
       shown.answer = answer;
+      shown.awaited -= 1;
     }
   }
   return response;
@@ -36,9 +47,7 @@ const LONGEST = 60_000;
 
 function pause(milliseconds) {
   if (performance.now() > LONGEST) {
-    throw new Error(
-      `the page took too long: ${JSON.stringify({ ...shown, scenes: shown.scenes.length, renderer: !!shown.renderer, bones: bones() })}`,
-    );
+    throw new Error(`the page took too long: ${JSON.stringify({ ...shown, scenes: shown.scenes.length })}`);
   }
   return new Promise((done) => setTimeout(done, milliseconds));
 }
@@ -61,6 +70,7 @@ addEventListener("unhandledrejection", ({ reason }) => failures.push(String(reas
 
 // With emulated hands, enters VR as soon as the page offers it, and moves the giver's hand.
 async function giveByHand() {
+  shown.awaited = Infinity;
   const device = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: false });
   device.installRuntime({ forceInstall: true });
   device.primaryInputMode = "hand";
@@ -79,24 +89,18 @@ async function giveByHand() {
     await pause(50);
     device.hands.right.position.x -= 0.004;
   }
+  // The next answer may be to a frame of before, the one after it is not.
+  shown.awaited = 2;
 }
 
 async function watch() {
   if (globalThis.IWER) {
     await giveByHand();
   }
-  let [before, resting] = ["", 0];
-  while (resting < 4 && failures.length === 0) {
-    await pause(100);
-    const now = JSON.stringify(bones());
-    resting = shown.answer && now !== "{}" && now === before ? resting + 1 : 0;
-    before = now;
+  while (!shown.picture && failures.length === 0) {
+    await pause(50);
   }
-  shown.picture = "wanted";
-  while (shown.picture === "wanted" && failures.length === 0) {
-    await pause(20);
-  }
-  return { answer: shown.answer, bones: bones(), picture: shown.picture, failures };
+  return { answer: shown.answer, bones: shown.bones, picture: shown.picture, failures };
 }
 
 const report = (result) => fetchAll("/result", { method: "POST", body: JSON.stringify(result) });
