@@ -3,7 +3,6 @@
 import { HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { VRButton } from "three/addons/webxr/VRButton.js";
-import { XRHandModelFactory } from "three/addons/webxr/XRHandModelFactory.js";
 import {
   createGraspClient,
   CurrentGraspStatus,
@@ -29,25 +28,31 @@ const tracker = new GraspTracker(
 
 const loader = new GLTFLoader();
 const object = (await loader.parseAsync((await downloadMesh(client, OBJECT)).buffer, "")).scene;
-const takers = new Map();
-for (const [handedness, side] of [
-  [Handedness.LEFT, "left"],
-  [Handedness.RIGHT, "right"],
-]) {
-  takers.set(handedness, (await loader.loadAsync(`../../../assets/hands/adult_${side}.glb`)).scene);
+async function loadHands() {
+  const [left, right] = ["left", "right"].map((side) => loader.loadAsync(`../../../assets/hands/adult_${side}.glb`));
+  return new Map([
+    [Handedness.LEFT, (await left).scene],
+    [Handedness.RIGHT, (await right).scene],
+  ]);
 }
+const [givers, takers] = [await loadHands(), await loadHands()];
 
 const renderer = new WebGLRenderer({ antialias: true });
 renderer.setSize(innerWidth, innerHeight);
 renderer.setClearColor("lightgray");
 renderer.xr.enabled = true;
 document.body.append(renderer.domElement, VRButton.createButton(renderer, { requiredFeatures: ["hand-tracking"] }));
-const scene = new Scene().add(object, ...takers.values(), new HemisphereLight("white", "dimgray", 4));
+const scene = new Scene().add(object, ...givers.values(), ...takers.values(), new HemisphereLight("white", "dimgray", 4));
 const camera = new PerspectiveCamera(60, innerWidth / innerHeight, 0.01, 10);
-const [left, right] = [renderer.xr.getHand(0), renderer.xr.getHand(1)];
-for (const hand of [left, right]) {
-  hand.add(new XRHandModelFactory().createHandModel(hand, "boxes"));
-  scene.add(hand);
+
+// Poses the hand of its side, and hides the other one.
+function show(models, hand) {
+  for (const [handedness, model] of models) {
+    model.visible = handedness === hand?.handedness;
+    if (model.visible) {
+      poseHand(model, hand);
+    }
+  }
 }
 
 // Puts the object between thumb and index finger, along the hand.
@@ -68,12 +73,7 @@ renderer.setAnimationLoop((_, frame) => {
     }
     tracker.push({ holdout: { clientFromObject: poseMessage(poseOf(object)), presentingHand: presentingHand(joints, true) } });
   }
-  const taking = tracker.handAt(poseOf(object));
-  for (const [handedness, taker] of takers) {
-    taker.visible = taking?.handedness === handedness;
-  }
-  if (taking) {
-    poseHand(takers.get(taking.handedness), taking);
-  }
+  show(givers, joints);
+  show(takers, tracker.handAt(poseOf(object)));
   renderer.render(scene, camera);
 });

@@ -1,7 +1,7 @@
 /** The joints of posed hands. */
 
 import { clone } from "@bufbuild/protobuf";
-import { HandPoseSchema, type HandPose } from "./gen/grasp/v1/holdout_pb.js";
+import { Convention, HandPoseSchema, type HandJoints, type HandPose } from "./gen/grasp/v1/holdout_pb.js";
 import { Conversion } from "./conventions.js";
 import { compose, inverse, poseMessage, rigid, type Rigid } from "./pose.js";
 
@@ -39,11 +39,15 @@ export interface NamedJoint {
   radius: number;
 }
 
-/** The joints of an answer's hand in OpenXR's order, axes and meters, whatever its convention; without those of missing digits. */
-export function jointsOf(hand: HandPose): NamedJoint[] {
-  const conversion = new Conversion(hand.convention);
+/**
+ * The joints of an answer's or a tracked hand in OpenXR's order, axes and meters, whatever its convention. Joints of missing digits, and
+ * those that lost tracking, are left out.
+ */
+export function jointsOf(hand: HandPose | HandJoints): NamedJoint[] {
+  const conversion = new Conversion("convention" in hand ? hand.convention : Convention.OPENXR);
+  const first = hand.joints.length === JOINT_NAMES.length ? 0 : WRIST;
   return JOINT_NAMES.flatMap((name, index) => {
-    const joint = hand.joints[conversion.jointAt(index)];
+    const joint = hand.joints[conversion.jointAt(index) - first];
     if (!joint?.pose) {
       return [];
     }

@@ -2,7 +2,7 @@
 
 import { Matrix4, PropertyBinding, Quaternion, Vector3, type Object3D } from "three";
 import { convertHand } from "./conventions.js";
-import { Convention, type HandPose, type Pose } from "./gen/grasp/v1/holdout_pb.js";
+import { Convention, type HandJoints, type HandPose, type Pose } from "./gen/grasp/v1/holdout_pb.js";
 import { jointsOf } from "./hand.js";
 import { rigid, type Rigid } from "./pose.js";
 
@@ -35,14 +35,15 @@ export function poseOf(object: Object3D): Rigid {
  * of `@webxr-input-profiles/assets`, or the controller of three's `XRHandMeshModel`. Every bone goes to its joint, wherever
  * the root is in the scene. `space` is the object whose frame is the client's, by default the world.
  */
-export function poseHand(root: Object3D, hand: HandPose, space?: Object3D): void {
+export function poseHand(root: Object3D, hand: HandPose | HandJoints, space?: Object3D): void {
   root.updateWorldMatrix(true, true);
   // Bounds of skinned meshes are those of their first pose: hands that left them would not be drawn.
   root.traverse((object) => (object.frustumCulled = false));
+  const size = "scale" in hand ? hand.scale : 1;
   for (const { name, pose } of jointsOf(hand)) {
     const bone = root.getObjectByName(name);
     if (bone) {
-      moveTo(bone, matrixOf(pose, hand.scale), space);
+      moveTo(bone, matrixOf(pose, size), space);
     }
   }
 }

@@ -27,7 +27,7 @@ const CAPSULES = [
   ["neck", [0, 1.52, 0], 0.05, SKIN],
   ["head", [0, 1.64, 0.01], 0.1, SKIN],
   ["UpperArm", [0.47, 1.38, 0], 0.05, SHIRT],
-  ["LowerArm", [0.7, 1.38, 0], 0.036, SHIRT],
+  ["LowerArm", [0.68, 1.38, 0], 0.033, SHIRT],
   ["UpperLeg", [0.09, 0.48, 0], 0.075, SHIRT],
   ["LowerLeg", [0.09, 0.07, 0], 0.055, SHIRT],
   ["Foot", [0.09, 0.04, 0.13], 0.045, SKIN],

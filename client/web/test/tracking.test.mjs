@@ -20,11 +20,15 @@ function tracker() {
     pushFrame: (frame) => new Promise((answer, reject) => calls.push({ frame, answer, reject })),
     deleteTrack: async ({ name }) => deleted.push(name),
   };
-  const tracked = new GraspTracker({ grasps }, { holdout: { object: "objects/remote" } }, {
-    onStatus: (status) => events.statuses.push(status),
-    onError: (error) => events.errors.push(error.code),
-    onAnswer: (answer) => events.answers.push(answer),
-  });
+  const tracked = new GraspTracker(
+    { grasps },
+    { holdout: { object: "objects/remote" } },
+    {
+      onStatus: (status) => events.statuses.push(status),
+      onError: (error) => events.errors.push(error.code),
+      onAnswer: (answer) => events.answers.push(answer),
+    },
+  );
   const push = async (x) => {
     tracked.push({ holdout: { clientFromObject: at(x) } });
     await settle();
@@ -46,7 +50,13 @@ test("one frame is on its way, and the newest follows", async () => {
   assert.deepEqual(calls.map(placeOf), [1]);
   await answer(REPLANNED, first);
   assert.deepEqual(calls.map(placeOf), [1, 3]);
-  assert.deepEqual(calls.map(({ frame }) => [frame.track, frame.sequence]), [["tracks/1", 1n], ["tracks/1", 2n]]);
+  assert.deepEqual(
+    calls.map(({ frame }) => [frame.track, frame.sequence]),
+    [
+      ["tracks/1", 1n],
+      ["tracks/1", 2n],
+    ],
+  );
   assert.ok(calls.every(({ frame }) => frame.captureTime.nanos >= 0));
   assert.equal(created.length, 1);
 });

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Handedness, presentingHand, trackedJoints } from "@grasp/client";
+import { Handedness, jointsOf, presentingHand, trackedJoints } from "@grasp/client";
 
 const SPACE = {};
 
@@ -48,4 +48,11 @@ test("a controller has no joints", () => {
   assert.equal(trackedJoints(frame, { hand: null, handedness: "left" }, space), undefined);
   const [, source] = tracked();
   assert.equal(trackedJoints(frame, { ...source, handedness: "none" }, space), undefined);
+});
+
+test("a tracked hand has named joints", () => {
+  const joints = jointsOf(trackedJoints(...tracked({ lost: [7] })));
+  assert.deepEqual([joints.length, joints[0].name, joints[0].pose.position.x], [24, "wrist", 0]);
+  assert.deepEqual([joints.at(-1).name, joints.at(-1).pose.position.x], ["pinky-finger-tip", 0.24]);
+  assert.ok(!joints.some(({ name }) => name === "index-finger-phalanx-intermediate"));
 });
