@@ -63,7 +63,7 @@ async function track() {
   };
   const tracker = new GraspTracker(
     { ...client, grasps: { ...client.grasps, createTrack } },
-    { holdout: HOLDOUT, output: { changesOnly: true } },
+    { holdout: HOLDOUT, search: { budget: { seconds: 1n } }, output: { changesOnly: true } },
     {
       onStatus: (status) => tracked.statuses.push(CurrentGraspStatus[status]),
       onAnswer: (answer) => (last = answer),
