@@ -44,6 +44,8 @@ def package():
     if not (PACKAGE / "installed.json").exists():
         pytest.skip("the web client's packages are not installed")
     ignored = shutil.ignore_patterns("node_modules", "dist", "gen", "viewer", "package-lock.json")
+    for folder in ["src", "test", "examples"]:
+        shutil.rmtree(PACKAGE / folder, ignore_errors=True)
     shutil.copytree(SOURCES, PACKAGE, dirs_exist_ok=True, ignore=ignored)
     for shared in ["proto", "assets"]:
         if not (WORK / shared).exists():

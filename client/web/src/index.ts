@@ -6,7 +6,7 @@ export * from "./hand.js";
 export * from "./ik.js";
 export * from "./keyFrames.js";
 export * from "./packed.js";
-export * from "./pose.js";
+export { compose, inverse, poseMessage, rigid, slerp, type Quat, type Rigid, type Vec3 } from "./pose.js";
 export * from "./tracking.js";
 export * from "./webxr.js";
 export * from "./gen/grasp/v1/error_reason_pb.js";

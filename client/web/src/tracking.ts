@@ -11,7 +11,7 @@ import { handBetween } from "./keyFrames.js";
 import { compose, inverse, rigid, type Rigid } from "./pose.js";
 
 /** A frame as it is pushed: `track` and `sequence` are the tracker's, `captureTime` is now unless given. */
-export type Frame = Omit<Exclude<MessageInitShape<typeof TrackFrameSchema>, TrackFrame>, "track" | "sequence">;
+export type PushedFrame = Omit<Exclude<MessageInitShape<typeof TrackFrameSchema>, TrackFrame>, "track" | "sequence">;
 
 /** Calls that a tracker makes. */
 export interface TrackerEvents {
@@ -36,7 +36,7 @@ const PAUSE = 250;
 export class GraspTracker {
   private name = "";
   private sequence = 0n;
-  private next: Frame | undefined;
+  private next: PushedFrame | undefined;
   private sending: Promise<void> | undefined;
   private isOpen = true;
   private previous: HandPose | undefined;
@@ -55,7 +55,7 @@ export class GraspTracker {
   ) {}
 
   /** Sends a frame, or the next one in its place. */
-  push(frame: Frame): void {
+  push(frame: PushedFrame): void {
     const now = performance.now();
     const captureTime = { seconds: BigInt(Math.floor(now / 1000)), nanos: Math.floor((now % 1000) * 1e6) };
     this.next = { captureTime, ...frame };
