@@ -27,6 +27,22 @@ func run() -> void:
 			var moved := Transform3D(Basis(Vector3.RIGHT, 2.0), Vector3(-1, 0, 2))
 			bones.pose(hand.at_object(moved))
 			check_joints(skeleton, hand.at_object(moved), "%s, %s, moved" % [object, side])
+	await check_stream()
+
+
+## The best grasps that differ, one message each.
+func check_stream() -> void:
+	var found: Array[Grasp] = []
+	var last := await client.stream_grasps({
+		"holdout": {"object": "objects/scissors"},
+		"receiver": {"handedness": "HANDEDNESS_LEFT"},
+		"search": {"budget": "0.5s"},
+		"alternatives": {"count": 3},
+	}, func(answer: GraspAnswer) -> void: found.append(answer.grasp))
+	print("streamed: %s, %s" % [found.map(func(grasp: Grasp) -> String: return grasp.type), last.outcome])
+	expect(found.size() == 3 and last.outcome == "FOUND" and last.error == null, "three grasps: %s" % last.error)
+	var wrong := await client.stream_grasps({"holdout": {"object": "objects/nowhere"}}, func(_answer: GraspAnswer) -> void: pass)
+	expect(wrong.error != null and wrong.error.code == "not_found", "an error at the end of a stream")
 
 
 func check_joints(skeleton: Skeleton3D, hand: GraspHand, of: String) -> void:

@@ -7,11 +7,14 @@ var answers: Array[GraspTrack.Answer] = []
 
 
 func run() -> void:
-	var giver := await find_giver()
-	var object := await holding_object()
+	var request: Dictionary = read_json("proto/golden/grasps.json").vectors[3].conventions[3].request
+	var object := GraspJson.read_pose(request.holdout.clientFromObject)
+	var hand := GraspHand.from_json(request.holdout.presentingHand.pose)
+	hand.object_from_wrist = object.affine_inverse() * hand.client_from_wrist
+	(await client.get_rig(hand.rig)).pose(hand)
+	var giver := XRHandTracker.new()
 	var track := await client.create_track({"holdout": {"object": "objects/remote"}, "receiver": {"handedness": "HANDEDNESS_LEFT"}})
 	expect(track.error == null and track.name.begins_with("tracks/"), "created: %s" % track.error)
-	var in_flight := 0
 	track.answered.connect(func(answer: GraspTrack.Answer) -> void: answers.append(answer))
 	for step in FRAMES:
 		var world_from_object := Transform3D(Basis(Vector3.UP, step * 0.02), Vector3(step * 0.004, 1.2, 0)) * object
@@ -34,25 +37,6 @@ func run() -> void:
 	expect(track.name == "", "the track is closed")
 
 
-var hand: GraspHand
-
-
-## A tracker with the giver's hand of a golden grasp.
-func find_giver() -> XRHandTracker:
-	var request: Dictionary = read_json("proto/golden/grasps.json").vectors[3].conventions[3].request
-	hand = GraspHand.from_json(request.holdout.presentingHand.pose)
-	var rig := await client.get_rig(hand.rig)
-	rig.pose(hand)
-	var client_from_object := GraspJson.read_pose(request.holdout.clientFromObject)
-	hand.object_from_wrist = client_from_object.affine_inverse() * hand.client_from_wrist
-	return XRHandTracker.new()
-
-
-func holding_object() -> Transform3D:
-	var request: Dictionary = read_json("proto/golden/grasps.json").vectors[3].conventions[3].request
-	return Transform3D(GraspJson.read_pose(request.holdout.clientFromObject).basis)
-
-
 func check_answers(track: GraspTrack) -> void:
 	var statuses := {}
 	var warned := 0
@@ -65,7 +49,8 @@ func check_answers(track: GraspTrack) -> void:
 	expect(answers.size() > FRAMES / 4 and answers.size() <= FRAMES, "most frames are answered")
 	for index in range(1, answers.size()):
 		expect(answers[index].sequence == answers[index - 1].sequence + 1, "one at a time, in order")
-	expect(answers[0].status == "REPLANNED" and statuses.get("KEPT", 0) > answers.size() / 2, "the grasp is found, then mostly kept")
+	var found := answers.filter(func(answer: GraspTrack.Answer) -> bool: return answer.status != "NONE")
+	expect(found[0].status == "REPLANNED" and statuses.get("KEPT", 0) > answers.size() / 2, "the grasp is found, then mostly kept")
 	expect(warned > 0 and warned < answers.size() / 2, "the giver's lost hand is warned of")
 	expect(track.grasp != null and track.grasp.hand.handedness == GraspHand.LEFT, "a left hand")
 	var kept := answers.filter(func(answer: GraspTrack.Answer) -> bool: return answer.status == "KEPT")

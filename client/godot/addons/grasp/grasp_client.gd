@@ -55,8 +55,8 @@ func stream_grasps(request: Dictionary, found: Callable) -> GraspAnswer:
 	return GraspAnswer.from_reply(last[0])
 
 
-## Begins to hold on to a grasp while giver and object move. [param track] is a [code]Track[/code]; its [member GraspTrack.error] says if
-## that failed.
+## Begins to hold on to a grasp while giver and object move. [param track] is a [code]Track[/code]: poses and the giver come with frames.
+## [member GraspTrack.error] of the answer says if that failed.
 func create_track(track: Dictionary) -> GraspTrack:
 	var request := in_godots_convention(track)
 	# Of a grasp that is kept, only the wrists come: GraspTrack knows the rest.
