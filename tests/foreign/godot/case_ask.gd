@@ -27,6 +27,7 @@ func run() -> void:
 			var moved := Transform3D(Basis(Vector3.RIGHT, 2.0), Vector3(-1, 0, 2))
 			bones.pose(hand.at_object(moved))
 			check_joints(skeleton, hand.at_object(moved), "%s, %s, moved" % [object, side])
+			check_skin(skeleton, moved, answer.grasp, "%s, %s, moved" % [object, side])
 	await check_stream()
 
 

@@ -14,6 +14,8 @@ var name := ""
 var grasp: Grasp
 
 var _client: GraspClient
+## The last grasp that came as a whole.
+var _whole: Grasp
 var _next: Dictionary = {}
 var _sequence := 0
 var _is_sending := false
@@ -93,11 +95,14 @@ func _read(message: Dictionary) -> Answer:
 		answer.withdrawal = GraspHand.from_json(current.withdrawal)
 	if message.has("grasp"):
 		answer.grasp = Grasp.from_json(message.grasp)
-		if answer.status == "KEPT" and answer.grasp.hand.joints.is_empty() and grasp:
+		if not answer.grasp.hand.joints.is_empty():
+			_whole = answer.grasp
+		elif _whole:
 			# Of a kept grasp only wrists and score came.
-			grasp.score = answer.grasp.score
-			grasp.hand = grasp.hand.at_wrist(answer.grasp.hand.client_from_wrist)
-			answer.grasp = grasp
+			var kept := Grasp.from_json(_whole.message)
+			kept.hand = _whole.hand.at_wrist(answer.grasp.hand.client_from_wrist)
+			kept.score = answer.grasp.score
+			answer.grasp = kept
 	if answer.status:
 		grasp = answer.grasp
 	return answer
