@@ -1,6 +1,6 @@
 class_name GraspCase
 extends SceneTree
-## A test of the add-on in a running engine: prints what it measures, and ends with 0 if all of it is as expected.
+## A test of the add-on in a running engine: prints its measurements, and ends with 0 if all are as expected.
 ##
 ## Arguments after "--": the server's URL, the folder of this repository, and those of the case.
 

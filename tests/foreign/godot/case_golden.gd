@@ -11,8 +11,8 @@ var farthest := {}
 func run() -> void:
 	var golden := read_json("proto/golden/grasps.json")
 	var rigs := {}
-	for name: String in golden.rigs:
-		rigs[name] = GraspRig.from_json(golden.rigs[name])
+	for rig: String in golden.rigs:
+		rigs[rig] = GraspRig.from_json(golden.rigs[rig])
 	for vector: Dictionary in golden.vectors:
 		var answers := {}
 		for one: Dictionary in vector.conventions:
@@ -20,8 +20,8 @@ func run() -> void:
 		for convention: String in answers:
 			check_conversion(answers[convention], answers.CONVENTION_OPENXR)
 			check_packed(answers[convention], rigs)
-	for what: String in farthest:
-		expect_within(farthest[what][1], farthest[what][0], what)
+	for name: String in farthest:
+		expect_within(farthest[name][1], farthest[name][0], name)
 	expect(golden.vectors.size() == 12, "there are twelve vectors")
 	await check_live(golden.vectors[3].conventions[3])
 
@@ -45,12 +45,12 @@ func check_conversion(sent: Dictionary, openxr: Dictionary) -> void:
 		note("forces, N", contact.force.distance_to(GraspJson.read_vector(expected.force)), METERS)
 
 
-func compare_joint(what: String, joint: Transform3D, openxr: Dictionary) -> void:
-	note(what + ", m", joint.origin.distance_to(GraspJson.read_vector(openxr.get("position", {}))), METERS)
+func compare_joint(name: String, joint: Transform3D, openxr: Dictionary) -> void:
+	note(name + ", m", joint.origin.distance_to(GraspJson.read_vector(openxr.get("position", {}))), METERS)
 	var turned := (joint.basis * GraspConvention.JOINT_TURN).get_rotation_quaternion()
 	var expected := GraspJson.read_pose(openxr).basis.get_rotation_quaternion()
 	var off := minf((turned - expected).length(), (turned + expected).length())
-	note(what + ", quaternions", off, METERS)
+	note(name + ", quaternions", off, METERS)
 
 
 func check_packed(sent: Dictionary, rigs: Dictionary) -> void:
@@ -86,5 +86,5 @@ func check_live(vector: Dictionary) -> void:
 	expect(Grasp.unpack(PackedByteArray()) == null and Grasp.unpack("12345678901234567890123".to_ascii_buffer()) == null, "no grasp")
 
 
-func note(what: String, value: float, bound: float) -> void:
-	farthest[what] = [maxf(value, farthest.get(what, [0.0])[0]), bound]
+func note(name: String, value: float, bound: float) -> void:
+	farthest[name] = [maxf(value, farthest.get(name, [0.0])[0]), bound]

@@ -2,8 +2,8 @@ class_name GraspClient
 extends Node
 ## Asks a Grasp server, by JSON over HTTP, in Godot's convention.
 ##
-## Requests are dictionaries with the names of the contract's JSON; [method GraspJson.pose] makes poses of transforms. Calls are awaited, and
-## any number may be in flight. What goes wrong is in the reply, and [signal failed] reports it, too.
+## Requests are dictionaries with the names of the contract's JSON; [method GraspJson.pose] makes poses of transforms. Await calls; any
+## number may be in flight. Errors are in the reply, and [signal failed] reports them, too.
 ## [codeblock]
 ## var answer := await client.find_grasp({"holdout": {"object": "objects/scissors"}})
 ## if answer.error:
@@ -22,7 +22,7 @@ const _SERVICE := "grasp.v1.GraspService/"
 ## Seconds after which a call ends. The server knows, and ends its search in time.
 @export var timeout := 30.0
 
-## What https trusts, if not the system's certificates.
+## The certificates that https trusts. Null: the system's.
 var tls: TLSOptions
 
 var _idle: Array[GraspConnection] = []

@@ -63,8 +63,8 @@ static func _text(fields: Dictionary, number: int) -> String:
 	return (fields[number][-1] as PackedByteArray).get_string_from_utf8() if fields.has(number) else ""
 
 
-## The fields of a message in protobuf's binary form, in which the Connect protocol has details: by number, all values. Of what details
-## have: integers, and bytes of texts and messages.
+## The fields of a message in protobuf's binary form, in which the Connect protocol sends details: all values by number. Details have
+## integers, and texts and messages as bytes.
 static func _fields(bytes: PackedByteArray) -> Dictionary:
 	var fields := {}
 	var stream := StreamPeerBuffer.new()

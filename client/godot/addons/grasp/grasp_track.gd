@@ -31,7 +31,7 @@ class Answer:
 	var grasp: Grasp
 	## The open hand, drawn back from the object; null unless the status is "ABORTED".
 	var withdrawal: GraspHand
-	## What is wrong in the frame, such as a hand that has lost tracking, and was taken as it was before.
+	## Faults of the frame, such as a hand that has lost tracking, which was taken where it was last.
 	var warnings := PackedStringArray()
 	## The whole message.
 	var message: Dictionary = {}
