@@ -5,44 +5,79 @@ use std::{
     time::Duration,
 };
 
-use tonic::transport::Endpoint;
+use tonic::transport::{Channel, Endpoint};
 use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
 
+use crate::listen::ListenAddress;
+
 /// Time limit for connection and answer, below the default of Kubernetes' probes, one second.
 const TIMEOUT: Duration = Duration::from_millis(900);
 
-/// Asks the server that listens on `listen` for its overall health. For an unspecified address, it connects over the
-/// loopback interface.
+/// Asks the server that listens on these addresses for its overall health, at the first that can be reached. For an unspecified
+/// address, it connects over the loopback interface, and for the default one also over that of IPv4.
 ///
 /// # Errors
 /// Says in words why the answer within 900 ms was not `SERVING`.
-pub async fn check_health(listen: SocketAddr) -> Result<(), String> {
-    if listen.port() == 0 {
-        return Err(format!(
-            "listen is {listen}; the port must be more than 0 for a health check"
-        ));
-    }
-    let address = reachable(listen);
-    let answered = tokio::time::timeout(TIMEOUT, ask(address)).await;
-    answered.map_err(|_| format!("{address} did not answer within {} ms", TIMEOUT.as_millis()))?
+pub async fn check_health(listen: &[ListenAddress]) -> Result<(), String> {
+    let answered = tokio::time::timeout(TIMEOUT, ask_any(listen)).await;
+    answered.unwrap_or_else(|_| {
+        let places: Vec<String> = listen
+            .iter()
+            .map(|address| reachable(address).to_string())
+            .collect();
+        Err(format!(
+            "{} did not answer within {} ms",
+            places.join(", "),
+            TIMEOUT.as_millis()
+        ))
+    })
 }
 
-fn reachable(listen: SocketAddr) -> SocketAddr {
-    let ip = match listen.ip() {
+async fn ask_any(listen: &[ListenAddress]) -> Result<(), String> {
+    let fallback = (listen == [ListenAddress::DEFAULT]).then_some(&ListenAddress::DEFAULT_V4);
+    let mut failures = Vec::new();
+    for address in listen.iter().chain(fallback) {
+        match connect(address).await {
+            Ok(channel) => return ask(address, channel).await,
+            Err(failure) => failures.push(failure),
+        }
+    }
+    Err(failures.join("; "))
+}
+
+fn reachable(listen: &ListenAddress) -> ListenAddress {
+    let ListenAddress::Tcp(address) = listen else {
+        return listen.clone();
+    };
+    let ip = match address.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
         IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
         ip => ip,
     };
-    SocketAddr::new(ip, listen.port())
+    ListenAddress::Tcp(SocketAddr::new(ip, address.port()))
 }
 
-async fn ask(address: SocketAddr) -> Result<(), String> {
+async fn connect(listen: &ListenAddress) -> Result<Channel, String> {
+    let address = reachable(listen);
+    let uri = match &address {
+        ListenAddress::Tcp(address) if address.port() == 0 => {
+            return Err(format!(
+                "listen is {listen}; the port must be more than 0 for a health check"
+            ));
+        }
+        ListenAddress::Tcp(address) => format!("http://{address}"),
+        ListenAddress::Unix(_) => address.to_string(),
+    };
     let failed =
         |error: tonic::transport::Error| format!("cannot connect to {address}: {}", innermost(&error));
-    let endpoint = Endpoint::from_shared(format!("http://{address}")).map_err(failed)?;
-    let channel = endpoint.connect().await.map_err(failed)?;
+    let endpoint = Endpoint::from_shared(uri).map_err(failed)?;
+    endpoint.connect().await.map_err(failed)
+}
+
+async fn ask(listen: &ListenAddress, channel: Channel) -> Result<(), String> {
+    let address = reachable(listen);
     let answer = HealthClient::new(channel)
         .check(HealthCheckRequest::default())
         .await
@@ -78,10 +113,11 @@ mod tests {
             ("[::]:50051", "[::1]:50051"),
             ("192.0.2.7:1", "192.0.2.7:1"),
             ("[::1]:9", "[::1]:9"),
+            ("unix:/a", "unix:/a"),
         ] {
-            assert_eq!(reachable(listen.parse().unwrap()), expected.parse().unwrap());
+            assert_eq!(reachable(&listen.parse().unwrap()), expected.parse().unwrap());
         }
-        let error = check_health("[::1]:0".parse().unwrap()).await.unwrap_err();
+        let error = check_health(&["[::1]:0".parse().unwrap()]).await.unwrap_err();
         assert!(error.contains("the port must be more than 0"), "{error}");
     }
 }

@@ -1,6 +1,6 @@
-//! The gRPC service that answers grasp requests.
+//! The service that answers grasp requests, over gRPC, gRPC-Web and Connect.
 //!
-//! [`run`] serves on a listener until it is shut down; the binary `grasp-server` adds flags, logs and signals.
+//! [`run`] serves on a listener, and [`Server::serve`] on several, until it is shut down; the binary `grasp-server` adds flags, logs and signals.
 //!
 //! A request passes these modules: `call` records its arrival and deadline; `services` handles it; `validate` turns the message
 //! into checked values or a list of all errors; `objects` finds the object with its search structures, `rigs` the hands, and
@@ -10,7 +10,8 @@
 //! may take, and how much of a deadline recent delays leave for it.
 //!
 //! `wire` converts single values of the contract, `middleware` is the form of layers around services. `web` lets pages in browsers
-//! call, and refuses pages of other origins and protocols other than gRPC and gRPC-Web.
+//! call, and refuses pages of other origins and protocols other than gRPC, gRPC-Web and Connect, which `connect` turns into gRPC.
+//! `listen` has the addresses and sockets on which the server listens.
 //!
 //! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
 //! contents.
@@ -24,8 +25,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  error  health_check  middleware  wire
-//! limits
+//! budget  convention  error  listen  middleware  wire
+//! health_check  limits
 //! atlas_slots  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
@@ -52,6 +53,7 @@ mod error;
 mod executor;
 mod health_check;
 mod limits;
+mod listen;
 mod memory;
 mod middleware;
 mod net;
@@ -70,6 +72,7 @@ pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
 pub use health_check::check_health;
 pub use limits::{StoreLimits, StreamLimits};
+pub use listen::{ListenAddress, Listener};
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use saved::StoreError;

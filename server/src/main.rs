@@ -1,8 +1,8 @@
-//! The binary: configuration, log, runtime, listener and signals; and the health check.
+//! The binary: configuration, log, runtime, listeners and signals; the health check, and the descriptor set.
 
 use std::{
     env, io,
-    io::IsTerminal as _,
+    io::{IsTerminal as _, Write as _},
     os::unix::process::CommandExt as _,
     path::PathBuf,
     process::{Command, ExitCode},
@@ -12,20 +12,17 @@ use std::{
 use clap::{CommandFactory as _, Parser};
 use futures_util::future::select_all;
 use grasp_server::{
-    Config, Server, check_health,
+    Config, Listener, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
     is_reserved_memory_limited, warn_of_memory,
 };
-use tokio::{
-    net::TcpListener,
-    signal::unix::{SignalKind, signal},
-};
+use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::{filter::Targets, fmt, layer::SubscriberExt as _, util::SubscriberInitExt as _};
 
 /// How long to wait at the end for work that has not stopped.
 const RUNTIME_END: Duration = Duration::from_millis(500);
 
-/// Answers grasp requests over gRPC.
+/// Answers grasp requests over gRPC, gRPC-Web and Connect.
 ///
 /// Every option can also be set in the environment or in a file. Flags override the environment, and the environment
 /// overrides the file.
@@ -47,6 +44,9 @@ struct Flags {
     /// An unspecified address (0.0.0.0, [::]) is reached over the loopback interface. The time limit is 900 ms.
     #[arg(long, conflicts_with = "print_config")]
     health_check: bool,
+    /// Print the descriptor set of the contract, for tools without reflection, and exit.
+    #[arg(long, conflicts_with_all = ["print_config", "health_check"])]
+    descriptor_set: bool,
     #[command(flatten)]
     values: RawConfig,
 }
@@ -73,6 +73,10 @@ fn limit_arenas() -> io::Result<()> {
 }
 
 fn start(mut flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
+    if flags.descriptor_set {
+        print_descriptor_set()?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let file = match &flags.config {
         Some(path) => read_file(path)?,
         None => RawConfig::default(),
@@ -86,7 +90,7 @@ fn start(mut flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()?;
-        runtime.block_on(check_health(config.listen))?;
+        runtime.block_on(check_health(&config.listen))?;
         return Ok(ExitCode::SUCCESS);
     }
     let arenas = limit_arenas();
@@ -104,6 +108,17 @@ fn start(mut flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
         }
         Err(error) => Err(error),
     }
+}
+
+fn print_descriptor_set() -> Result<(), Box<dyn std::error::Error>> {
+    let mut output = io::stdout();
+    if output.is_terminal() {
+        return Err(
+            "the descriptor set is binary; redirect it: grasp-server --descriptor-set > grasp.binpb".into(),
+        );
+    }
+    output.write_all(grasp_proto::FILE_DESCRIPTOR_SET)?;
+    Ok(output.flush()?)
 }
 
 fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
@@ -132,9 +147,11 @@ fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error::Error>> {
-    let listener = TcpListener::bind(config.listen)
-        .await
-        .map_err(|error| format!("cannot listen on {}: {error}", config.listen))?;
+    let mut listeners = Vec::new();
+    for address in &config.listen {
+        let listener = Listener::bind(address).await;
+        listeners.push(listener.map_err(|error| format!("cannot listen on {address}: {error}"))?);
+    }
     // Before logging that the server is there: from now on, signals start the drain.
     let kinds = [
         SignalKind::terminate(),
@@ -146,8 +163,10 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
     let shutdown = async move {
         select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
     };
-    tracing::info!(address = %listener.local_addr()?, workers = config.workers, "serving");
-    server.serve(listener, shutdown).await?;
+    for listener in &listeners {
+        tracing::info!(address = %listener.address()?, workers = config.workers, "serving");
+    }
+    server.serve(listeners, shutdown).await?;
     Ok(())
 }
 

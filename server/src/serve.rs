@@ -34,6 +34,7 @@ use crate::{
     error::Limit,
     executor::SearchExecutor,
     limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
+    listen::Listener,
     middleware::Around,
     net::{MAX_HEADERS, UnreadAnswers, UnreadCount, accept},
     objects::{
@@ -158,7 +159,7 @@ pub async fn run(
     config: Config,
     shutdown: impl Future<Output = ()> + Send,
 ) -> Result<(), ServeError> {
-    Server::new(config)?.serve(listener, shutdown).await
+    Server::new(config)?.serve([listener.into()], shutdown).await
 }
 
 impl Server {
@@ -257,31 +258,36 @@ impl Server {
         Gauges(self.handler.clone())
     }
 
-    /// Serves; see [`run`].
+    /// Serves on one or more listeners, which share all limits; see [`run`].
     ///
     /// # Errors
     /// See [`ServeError`].
+    ///
+    /// # Panics
+    /// There is no listener.
     pub async fn serve(
         self,
-        listener: TcpListener,
+        listeners: impl IntoIterator<Item = Listener> + Send,
         shutdown: impl Future<Output = ()> + Send,
     ) -> Result<(), ServeError> {
-        self.serve_boxed(listener, Box::pin(shutdown)).await
+        let listeners: Vec<Listener> = listeners.into_iter().collect();
+        assert!(!listeners.is_empty(), "there is a listener");
+        self.serve_boxed(listeners, Box::pin(shutdown)).await
     }
 
     /// Serves. Boxed and without type parameters, so that handlers and transport are compiled with this crate and not once more
     /// with every program that starts a server.
     fn serve_boxed(
         self,
-        listener: TcpListener,
+        listeners: Vec<Listener>,
         shutdown: BoxFuture<'_, ()>,
     ) -> BoxFuture<'_, Result<(), ServeError>> {
-        Box::pin(self.serve_until(listener, shutdown))
+        Box::pin(self.serve_until(listeners, shutdown))
     }
 
     async fn serve_until(
         self,
-        listener: TcpListener,
+        listeners: Vec<Listener>,
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
         self.read_saved().await?;
@@ -312,7 +318,7 @@ impl Server {
         let stop = handler.shutdown.clone();
         let close = CancellationToken::new();
         let incoming = accept(
-            listener,
+            listeners,
             config.maximum_connections.get(),
             Arc::clone(&handler.unread),
             stop.clone(),

@@ -47,7 +47,7 @@ impl TestServer {
         let server = Server::new(config).expect("the server starts");
         let gauges = server.gauges();
         let stop = CancellationToken::new();
-        let serving = tokio::spawn(server.serve(listener, stop.clone().cancelled_owned()));
+        let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));
         Self {
             address,
             gauges,

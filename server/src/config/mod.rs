@@ -2,7 +2,7 @@
 
 mod raw;
 
-use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration};
+use std::{fmt, num::NonZeroUsize, path::PathBuf, time::Duration};
 
 pub use crate::saved::StorePlace;
 pub use raw::{RawConfig, read_file, unknown_variables};
@@ -13,6 +13,7 @@ use grasp_synthesis::search::settings::REFINEMENT;
 use crate::{
     budget::BudgetLimits,
     limits::{StoreLimits, StreamLimits},
+    listen::ListenAddress,
     web::WebOrigins,
 };
 
@@ -40,8 +41,8 @@ impl fmt::Display for LogFormat {
 /// A checked configuration. The defaults suit the clients of one machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Config {
-    /// Address to listen on. `run` ignores it and takes a listener.
-    pub listen: SocketAddr,
+    /// Addresses to listen on, at least one. `run` ignores them and takes a listener.
+    pub listen: Vec<ListenAddress>,
     /// Number of search threads. More find grasps sooner, up to the number of cores.
     pub workers: NonZeroUsize,
     /// Number of threads of the binary's async runtime.
@@ -98,7 +99,7 @@ impl Default for Config {
         let cores = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
         let non_zero = |n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN);
         Self {
-            listen: SocketAddr::from((std::net::Ipv6Addr::LOCALHOST, 50051)),
+            listen: vec![ListenAddress::DEFAULT],
             workers: cores,
             // Messages are small: a thread serves thousands of calls per second.
             io_threads: non_zero((cores.get() / 8).max(2)),

@@ -12,11 +12,12 @@ use clap::{
     builder::{OsStringValueParser, TypedValueParser},
 };
 use grasp_assets::hands::RIG_NAMES;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{Config, ConfigError, LogFormat, StorePlace};
 use crate::{
     limits::MAX_RESPONSE,
+    listen::{ListenAddress, NEEDED_LISTEN},
     saved::NEEDED_PLACE,
     web::{NEEDED_ORIGINS, parse_origins},
 };
@@ -27,9 +28,13 @@ const VARIABLE_PREFIX: &str = "GRASP_";
 #[derive(Args, Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawConfig {
-    /// Address to listen on [default: `[::1]:50051`].
-    #[arg(long, env = "GRASP_LISTEN", value_name = "ADDRESS")]
-    pub listen: Option<String>,
+    /// Addresses to listen on, separated by commas or each with a flag of its own: an address with a port, or `unix:/PATH`
+    /// [default: `[::1]:50051`, or `127.0.0.1:50051` without IPv6].
+    ///
+    /// The socket of a path is private to the server's user. All addresses share the limits.
+    #[arg(long, env = "GRASP_LISTEN", value_name = "ADDRESS", value_delimiter = ',')]
+    #[serde(deserialize_with = "one_or_more")]
+    pub listen: Option<Vec<String>>,
     /// Search threads [default: one per core].
     #[arg(long, env = "GRASP_WORKERS", value_name = "COUNT")]
     pub workers: Option<u64>,
@@ -157,6 +162,20 @@ fn any_path() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().map(PathBuf::from)
 }
 
+/// A list, or one text with commas.
+fn one_or_more<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<String>>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Texts {
+        One(String),
+        More(Vec<String>),
+    }
+    Ok(Some(match Texts::deserialize(reader)? {
+        Texts::One(text) => text.split(',').map(str::to_owned).collect(),
+        Texts::More(texts) => texts,
+    }))
+}
+
 /// Reads a configuration file.
 ///
 /// # Errors
@@ -197,7 +216,7 @@ impl RawConfig {
             };
         }
         let (budgets, streams) = (&mut config.budgets, &mut config.streams);
-        read!(text(listen => config.listen, "an address like [::1]:50051", |text| text.parse().ok()));
+        read!(addresses(listen => config.listen,));
         read!(number(workers => config.workers, 1..=1024));
         read!(number(io_threads => config.io_threads, 1..=1024));
         read!(time(default_budget_ms => budgets.default, 1..=600_000));
@@ -286,6 +305,22 @@ impl Check {
         value.clone_from(raw);
     }
 
+    fn addresses(&mut self, key: &str, raw: &mut Option<Vec<String>>, value: &mut Vec<ListenAddress>) {
+        if let Some(texts) = raw {
+            *value = Vec::new();
+            for text in texts.iter() {
+                match text.trim().parse() {
+                    Ok(address) => value.push(address),
+                    Err(_) => self.reject(key, format_args!("{text:?}"), NEEDED_LISTEN),
+                }
+            }
+            if texts.is_empty() {
+                self.reject(key, "[]", NEEDED_LISTEN);
+            }
+        }
+        *raw = Some(value.iter().map(ToString::to_string).collect());
+    }
+
     fn text<T: fmt::Display>(
         &mut self,
         key: &str,
@@ -371,7 +406,7 @@ mod tests {
                 panic!("most of it is wrong");
             };
             assert_eq!(bad.len(), expected, "{bad:?}");
-            let listen = "listen is \"\"; it must be an address like [::1]:50051";
+            let listen = "listen is \"\"; it must be an address like [::1]:50051, or unix:/PATH";
             let workers = format!("workers is {number}; it must be 1 to 1024");
             assert!(
                 bad.contains(&listen.to_owned()) && bad.contains(&workers),
@@ -388,6 +423,21 @@ mod tests {
             error.to_string(),
             "default_budget_ms is 500; it must be at most maximum_budget_ms, 400"
         );
+    }
+
+    #[test]
+    fn addresses_may_be_a_list_or_a_text_with_commas() {
+        let listen = |text: &str| {
+            let mut raw: RawConfig = toml::from_str(text).unwrap();
+            raw.complete(RawConfig::default()).map(|config| config.listen)
+        };
+        let both = listen("listen = ['[::1]:1', 'unix:/a']").unwrap();
+        assert_eq!(both, ["[::1]:1", "unix:/a"].map(|text| text.parse().unwrap()));
+        assert_eq!(listen("listen = '[::1]:1,unix:/a'").unwrap(), both);
+        assert_eq!(listen("").unwrap(), [ListenAddress::DEFAULT]);
+        for wrong in ["[]", "''", "'[::1]:1,'", "['here']"] {
+            assert!(listen(&format!("listen = {wrong}")).is_err(), "{wrong}");
+        }
     }
 
     #[test]

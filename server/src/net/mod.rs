@@ -14,9 +14,9 @@ use std::{
     time::Duration,
 };
 
+use futures_util::future::select_all;
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
-    net::{TcpListener, TcpStream},
     sync::{OwnedSemaphorePermit, Semaphore, mpsc},
     time::Sleep,
 };
@@ -24,6 +24,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::transport::server::Connected;
 
+use crate::listen::{Listener, Stream};
 pub(crate) use answers::{UnreadCount, arriving};
 pub(crate) use unread::{Reader, UnreadAnswers};
 
@@ -44,10 +45,10 @@ const PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 /// Largest part of an HTTP/1 request's headers that is read at once, in bytes.
 const HEADERS_READ: usize = 4 << 10;
 
-/// Accepts connections until `stop`, which closes the listener immediately; beyond `most` open ones, others wait in the kernel's
-/// queue. `close` ends every connection.
+/// Accepts connections until `stop`, which closes the listeners immediately; beyond `most` open ones of all listeners together, others
+/// wait in the kernel's queue. `close` ends every connection.
 pub(crate) fn accept(
-    listener: TcpListener,
+    mut listeners: Vec<Listener>,
     most: usize,
     unread: Arc<UnreadAnswers>,
     stop: CancellationToken,
@@ -60,11 +61,9 @@ pub(crate) fn accept(
         let mut pause = FIRST_PAUSE;
         // The semaphore is never closed.
         while let Ok(place) = Arc::clone(&places).acquire_owned().await {
-            match listener.accept().await {
-                Ok((stream, _)) => {
+            match accept_any(&mut listeners).await {
+                Ok(stream) => {
                     pause = FIRST_PAUSE;
-                    // Small messages must not wait for others. If this fails, the first read fails too.
-                    let _ = stream.set_nodelay(true);
                     let connection = Connection::new(stream, place, unread.connect(), close.clone());
                     if sender.send(Ok(connection)).await.is_err() {
                         return;
@@ -85,6 +84,15 @@ pub(crate) fn accept(
     ReceiverStream::new(receiver)
 }
 
+/// The next connection of any listener. The one that had it comes last the next time.
+async fn accept_any(listeners: &mut [Listener]) -> io::Result<Stream> {
+    let accepting = listeners.iter().map(|listener| Box::pin(listener.accept()));
+    let (stream, index, others) = select_all(accepting).await;
+    drop(others);
+    listeners.rotate_left(index + 1);
+    stream
+}
+
 /// True if only one connection is lost. All other errors are a lack of resources.
 fn concerns_one_connection(error: &io::Error) -> bool {
     matches!(
@@ -96,12 +104,12 @@ fn concerns_one_connection(error: &io::Error) -> bool {
     )
 }
 
-/// A TCP connection that counts to the server's limit. Reading fails if the client does not send as many bytes as the HTTP/2
+/// A connection that counts to the server's limit. Reading fails if the client does not send as many bytes as the HTTP/2
 /// preface has in time, or if the headers of an HTTP/1 request are too large; reading and writing fail once the connection is cut
 /// off.
 #[derive(Debug)]
 pub(crate) struct Connection {
-    stream: TcpStream,
+    stream: Stream,
     closed: Pin<Box<WaitForCancellationFutureOwned>>,
     cut_off: Pin<Box<WaitForCancellationFutureOwned>>,
     reader: Arc<Reader>,
@@ -128,7 +136,7 @@ struct Headers {
 
 impl Connection {
     fn new(
-        stream: TcpStream,
+        stream: Stream,
         place: OwnedSemaphorePermit,
         reader: Arc<Reader>,
         close: CancellationToken,
@@ -258,16 +266,20 @@ impl AsyncWrite for Connection {
 
 #[cfg(test)]
 mod tests {
-    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+    use tokio::{
+        io::{AsyncReadExt as _, AsyncWriteExt as _},
+        net::TcpStream,
+    };
 
     use super::*;
 
     #[tokio::test]
     async fn headers_of_http_1_are_bounded_and_bodies_are_not() {
         let reader = UnreadAnswers::new(usize::MAX).connect();
-        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let mut client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
-        let (stream, _) = listener.accept().await.unwrap();
+        let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap()).await.unwrap();
+        let address = listener.address().unwrap().to_string();
+        let mut client = TcpStream::connect(address).await.unwrap();
+        let stream = listener.accept().await.unwrap();
         let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
         let mut connection = Connection::new(stream, place, Arc::clone(&reader), CancellationToken::new());
         let sending = tokio::spawn(async move {

@@ -117,6 +117,42 @@ fn health_check_passes_while_the_server_runs() {
     assert!(text.starts_with("error: cannot connect to 127.0.0.1:"), "{text}");
 }
 
+#[test]
+fn serves_on_several_addresses_and_a_socket_and_is_healthy_at_the_first_that_answers() {
+    let socket = std::env::temp_dir().join(format!("grasp-binary-{}.sock", std::process::id()));
+    let unix = format!("unix:{}", socket.display());
+    let listen = format!("127.0.0.1:0,{unix}");
+    let mut server = Running::start(&[("GRASP_LISTEN", &listen)]);
+    let mut line = String::new();
+    let log = server.log.as_mut().expect("it is open");
+    log.read_line(&mut line).expect("the server writes text");
+    assert!(line.contains(&format!("address={unix}")), "{line}");
+    let tcp = server.address.clone();
+    let nobody = free_address();
+    for listen in [
+        &unix,
+        &tcp,
+        &format!("{nobody},{unix}"),
+        &format!("{unix},{nobody}"),
+    ] {
+        let check = output("grasp-server --health-check", &[("GRASP_LISTEN", listen)]);
+        assert_eq!(check, (0, String::new()), "{listen}");
+    }
+    let second = output("grasp-server", &[("GRASP_LISTEN", &unix)]);
+    assert_eq!(second.0, 1);
+    assert!(second.1.contains("another server listens there"), "{}", second.1);
+    server.terminate();
+    assert!(!socket.exists());
+}
+
+#[test]
+fn prints_the_descriptor_set_but_not_to_a_terminal() {
+    let mut command = command("grasp-server --descriptor-set", &[]);
+    let output = command.output().expect("there is a shell");
+    assert!(output.status.success());
+    assert_eq!(output.stdout, grasp_proto::FILE_DESCRIPTOR_SET);
+}
+
 /// A command without a setting of the store, but with a home.
 const DEFAULT_STORE: &str = "unset GRASP_STORE; exec grasp-server";
 

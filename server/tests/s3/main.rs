@@ -43,7 +43,7 @@ impl Running {
         let address = listener.local_addr().unwrap();
         let server = Server::new(config()).unwrap();
         let stop = CancellationToken::new();
-        let serving = tokio::spawn(server.serve(listener, stop.clone().cancelled_owned()));
+        let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));
         Self {
             address,
             stop,

@@ -36,10 +36,10 @@ async function rejection(client) {
   return null;
 }
 
-// How a call ends whose deadline has passed when it arrives. The client would not ask if it knew.
-async function expired(client) {
+// How a call ends whose deadline, in a header, has passed when it arrives. The client would not ask if it knew.
+async function expired(client, deadline) {
   try {
-    await client.findGrasp(REMOTE, { headers: { "grpc-timeout": "1n" } });
+    await client.findGrasp(REMOTE, { headers: deadline });
   } catch (error) {
     const known = ConnectError.from(error);
     return { code: Code[known.code], details: known.details.map((detail) => detail.type) };
@@ -97,17 +97,22 @@ async function trackMotion(client) {
   return answers;
 }
 
-// All calls to a server, and one to a server that does not allow this page.
-export async function allCalls(server, forbidding) {
-  const client = createClient(GraspService, createGrpcWebTransport({ baseUrl: server }));
-  const result = {
+// All calls over a transport; the header is a deadline that has passed.
+export async function callsOver(transport, deadline) {
+  const client = createClient(GraspService, transport);
+  return {
     found: await findGrasp(client),
     rejection: await rejection(client),
-    expired: await expired(client),
+    expired: await expired(client, deadline),
     streamed: await streamGrasps(client),
     left: await leave(client),
     tracked: await trackMotion(client),
   };
+}
+
+// All calls to a server, and one to a server that does not allow this page.
+export async function allCalls(server, forbidding) {
+  const result = await callsOver(createGrpcWebTransport({ baseUrl: server }), { "grpc-timeout": "1n" });
   if (forbidding) {
     const refused = createClient(GraspService, createGrpcWebTransport({ baseUrl: forbidding }));
     try {

@@ -1,6 +1,7 @@
 //! The server over real gRPC, in one binary that is linked once.
 
 mod atlases;
+mod connect;
 mod conventions;
 mod examples;
 mod find_grasp;

@@ -11,15 +11,8 @@ use std::{
 
 /// The server's top-level modules, as documented in its `lib.rs`.
 const SERVER: &[&[&str]] = &[
-    &[
-        "budget",
-        "convention",
-        "error",
-        "health_check",
-        "middleware",
-        "wire",
-    ],
-    &["limits"],
+    &["budget", "convention", "error", "listen", "middleware", "wire"],
+    &["health_check", "limits"],
     &["atlas_slots", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],

@@ -313,7 +313,7 @@ async fn a_server_with_too_low_limits_for_saved_rigs_does_not_start() {
     let listener = tokio::net::TcpListener::bind("[::1]:0").await.unwrap();
     let ended = bounded(
         "the end of the start",
-        server.serve(listener, std::future::pending()),
+        server.serve([listener.into()], std::future::pending()),
     )
     .await;
     let Err(ServeError::Store(error)) = ended else {

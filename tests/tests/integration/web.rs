@@ -91,14 +91,28 @@ async fn only_pages_of_the_own_machine_may_call_by_default() {
     );
     assert_eq!(allowed.header("access-control-allow-methods"), Some("POST"));
     let headers = allowed.header("access-control-allow-headers").unwrap();
-    for header in ["content-type", "grpc-timeout", "x-grpc-web", "x-user-agent"] {
+    for header in [
+        "content-type",
+        "grpc-timeout",
+        "x-grpc-web",
+        "x-user-agent",
+        "connect-protocol-version",
+        "connect-timeout-ms",
+        "content-encoding",
+    ] {
         assert!(headers.contains(header), "{headers}");
     }
+    let private = "access-control-allow-private-network";
+    assert_eq!(allowed.header(private), Some("true"));
     let foreign = "https://game.example";
     let refused = preflight(server.address(), foreign).await;
     assert_eq!(
-        (refused.status, refused.header("access-control-allow-origin")),
-        (403, None)
+        (
+            refused.status,
+            refused.header("access-control-allow-origin"),
+            refused.header(private)
+        ),
+        (403, None, None)
     );
     // A call has no effect either, even if the browser ignores the refused preflight request.
     let create = framed(&box_request("planted"));
@@ -116,10 +130,9 @@ fn text(answer: &Answer) -> &str {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn requests_other_than_grpc_web_are_refused_over_http_1_with_the_cause() {
+async fn requests_of_other_protocols_are_refused_over_http_1_with_the_cause() {
     let server = TestServer::start().await;
     for (content_type, status, cause) in [
-        ("application/json", 415, "Connect"),
         ("application/grpc", 400, "HTTP/2"),
         ("text/plain", 415, "application/grpc-web+proto"),
     ] {

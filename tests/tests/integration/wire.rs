@@ -1,4 +1,4 @@
-//! Clients made by hand: of gRPC over HTTP/2, and of gRPC-Web over HTTP/1.1 as browsers are.
+//! Clients made by hand: of gRPC over HTTP/2, of gRPC-Web over HTTP/1.1 as browsers are, and of Connect over both.
 
 use std::{fmt::Write as _, net::SocketAddr};
 
@@ -189,6 +189,7 @@ pub(crate) async fn preflight(address: SocketAddr, origin: &str) -> Answer {
             "access-control-request-headers",
             "content-type,x-grpc-web,grpc-timeout",
         ),
+        ("access-control-request-private-network", "true"),
     ];
     without_body(address, "OPTIONS", "/grasp.v1.GraspService/FindGrasp", &headers).await
 }
