@@ -1,4 +1,4 @@
-"""Builds the Python package, installs it as its README says, and checks it: README, sync and asyncio, golden grasps, types, the sample."""
+"""Builds the Python package, installs it as its README says, and checks it: README, calls, golden grasps, types and the sample."""
 
 import os
 import re
@@ -21,6 +21,7 @@ ENVIRONMENT = {
     "PIP_NO_INDEX": "1",
     "PIP_FIND_LINKS": str(WORK / "wheels"),
     "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+    "PIP_NO_COMPILE": "1",
     "PYTHONDONTWRITEBYTECODE": "1",
 }
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 import pathlib
 import pickle
 import socket
@@ -16,6 +17,7 @@ import grasp
 from gateway import gateway_to
 from grasp import v1
 
+ADDRESS = os.environ["GRASP_ADDRESS"]
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 HELD_UP = grasp.matrix(([0.1, 1.2, 0.4], [0.0, 0.6, 0.0, 0.8]))
 
@@ -81,8 +83,8 @@ def kind(request):
 
 
 @pytest.fixture
-def either(kind, address):
-    with opened(kind, address) as client:
+def either(kind):
+    with opened(kind, ADDRESS) as client:
         yield client
 
 
@@ -150,8 +152,8 @@ def test_tracks_a_giver_who_moves(either):
     assert {violation.field for violation in refused.value.violations} >= {"track.holdout.up"}
 
 
-def test_the_latest_frame_wins(client, address):
-    with client.track("objects/remote") as track:
+def test_the_latest_frame_wins():
+    with grasp.Client(ADDRESS) as client, client.track("objects/remote") as track:
         track.push()
         answers = []
         threads = [threading.Thread(target=lambda: answers.append(track.push())) for _ in range(20)]
@@ -163,7 +165,7 @@ def test_the_latest_frame_wins(client, address):
         assert max(answer.message.sequence for answer in answers) == 21
 
     async def together():
-        async with grasp.AsyncClient(address) as client, client.track("objects/remote") as track:
+        async with grasp.AsyncClient(ADDRESS) as client, client.track("objects/remote") as track:
             return await asyncio.gather(*(track.push() for _ in range(20)))
 
     answers = asyncio.run(together())
@@ -172,16 +174,16 @@ def test_the_latest_frame_wins(client, address):
     assert len({answer.message.sequence for answer in answers}) < 20
 
 
-def test_tracks_without_streams_in_both_directions(kind, address):
-    with gateway_to(address) as (gateway, through), opened(kind, through) as client:
+def test_tracks_without_streams_in_both_directions(kind):
+    with gateway_to(ADDRESS) as (gateway, through), opened(kind, through) as client:
         with client.track("objects/remote", receiver="right") as track:
             assert [track.push().status for _ in range(3)] == ["replanned", "kept", "kept"]
         assert gateway.methods == ["TrackHoldout", "CreateTrack", *["PushFrame"] * 3, "DeleteTrack"]
 
 
-def test_unavailable_servers_are_asked_again(kind, address):
+def test_unavailable_servers_are_asked_again(kind):
     unavailable, exhausted = grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.RESOURCE_EXHAUSTED
-    with gateway_to(address) as (gateway, through), opened(kind, through) as client:
+    with gateway_to(ADDRESS) as (gateway, through), opened(kind, through) as client:
         gateway.failures = [(unavailable, 0.3, ()), (unavailable, 0, (("grpc-retry-pushback-ms", "10"),))]
         started = time.monotonic()
         assert client.find("objects/remote").grasp
@@ -290,3 +292,20 @@ def test_rigs_are_created_from_models(either, kind):
     either.rigs.delete(rig.name)
     with pytest.raises(grasp.NotFound):
         either.rigs.get(rig.name)
+
+
+def test_hands_may_lack_a_finger(either, kind):
+    adult = next(hand for hand in either.rigs.get("rigs/adult").hands if hand.handedness == v1.HANDEDNESS_RIGHT)
+    joints = grasp.Joints.from_messages(adult.stretched_joints, "right", "openxr")
+    joints.positions[21:] = np.nan
+    request = v1.CreateRigRequest(rig_id=f"four-{kind}", joints=[joints.message()])
+    rig = either.call(grasp.methods.CREATE_RIG, request)
+    receiver = v1.Receiver(rig=rig.name, handedness=v1.HANDEDNESS_RIGHT, scale=0.9)
+    hand = either.find("objects/remote", receiver=receiver, budget=5, packed=True, convention="unity_flip_x").grasp
+    assert np.isnan(hand.joints.positions).all(1).tolist() == [False] * 21 + [True] * 5
+    packed = grasp.PackedGrasp.decode(hand.packed)
+    assert (packed.rig, packed.scale, packed.convention) == (rig.name, 0.9, "unity_flip_x")
+    assert np.isnan(packed.angles).all(1).tolist() == [False] * 4 + [True]
+    # The object is at the client's origin.
+    np.testing.assert_allclose(packed.joints(rig).positions, hand.joints.positions, rtol=0, atol=5e-4)
+    either.rigs.delete(rig.name)

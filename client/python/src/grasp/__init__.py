@@ -5,8 +5,8 @@
         if result.grasp:
             print(result.grasp.client_from_wrist, result.grasp.joints.positions)
 
-Poses are 4x4 numpy matrices that map points, `a_from_b @ [x, y, z, 1]`, or pairs of a position and a quaternion x, y, z, w. Frames are
-right-handed, +Y up, in meters, unless `convention` names another engine's. Times are in seconds.
+Poses are 4x4 numpy matrices that map points, `a_from_b @ [x, y, z, 1]`, or pairs of a position and a quaternion x, y, z, w. Frames
+are right-handed, +Y up, in meters, unless `convention` names another engine's. Times are in seconds.
 """
 
 from . import conventions, methods, v1

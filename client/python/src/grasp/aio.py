@@ -107,7 +107,7 @@ class AsyncClient:
         attempts = Attempts(self._retry, self._time(prepared))
         while True:
             try:
-                return await send(attempts.remaining())
+                return await send(attempts.begin())
             except grpc.RpcError as error:
                 wait = attempts.wait_after(error)
             await asyncio.sleep(wait)
@@ -125,7 +125,7 @@ class AsyncClient:
             method.path, method.request.SerializeToString, method.response.FromString
         )
         attempts = Attempts(self._retry, None if endless else self._time(prepared))
-        first = open_call(prepared.message, timeout=attempts.remaining())
+        first = open_call(prepared.message, timeout=attempts.begin())
 
         async def messages() -> AsyncGenerator[T, None]:
             call, started = first, False
@@ -140,7 +140,7 @@ class AsyncClient:
                 finally:
                     call.cancel()
                 await asyncio.sleep(wait)
-                call = open_call(prepared.message, timeout=attempts.remaining())
+                call = open_call(prepared.message, timeout=attempts.begin())
 
         return messages()
 

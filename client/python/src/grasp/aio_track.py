@@ -41,7 +41,7 @@ class AsyncTrack:
         self._call = call
         self._channel = channel
         self._message = message
-        self._convention = convention
+        self._convention: Convention | None = convention
         self._timeout = timeout
         self._retry = retry
         self._sequence = 0
@@ -63,7 +63,7 @@ class AsyncTrack:
         frame = requests.frame(self._sequence, self._convention, options)
         attempts = Attempts(self._retry, self._timeout)
         while not self._name:
-            left = attempts.remaining()
+            left = attempts.begin()
             stream = self._stream = self._stream or _Stream(self._channel, self._message)
             try:
                 return TrackAnswer(await stream.push(frame, left or 0))

@@ -117,7 +117,7 @@ class Client:
         attempts = Attempts(self._retry, self._time(prepared))
         while True:
             try:
-                return send(attempts.remaining())
+                return send(attempts.begin())
             except grpc.RpcError as error:
                 time.sleep(attempts.wait_after(error))
 
@@ -134,7 +134,7 @@ class Client:
             method.path, method.request.SerializeToString, method.response.FromString
         )
         attempts = Attempts(self._retry, None if endless else self._time(prepared))
-        first = open_call(prepared.message, timeout=attempts.remaining())
+        first = open_call(prepared.message, timeout=attempts.begin())
 
         def messages() -> Generator[T, None, None]:
             call, started = first, False
@@ -149,7 +149,7 @@ class Client:
                 finally:
                     call.cancel()
                 time.sleep(wait)
-                call = open_call(prepared.message, timeout=attempts.remaining())
+                call = open_call(prepared.message, timeout=attempts.begin())
 
         return messages()
 

@@ -55,7 +55,8 @@ def directions(
 ) -> Array:
     """Converts directions, normals or forces (..., 3): the axes change, lengths do not."""
     turn = _left(target, at_object) @ _left(source, at_object).T
-    return np.asarray(directions, float) @ turn.T
+    turned: Array = np.asarray(directions, float) @ turn.T
+    return turned
 
 
 def points(points: npt.ArrayLike, source: Convention, target: Convention, *, at_object: bool = False) -> Array:

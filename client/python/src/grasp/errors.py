@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -171,7 +171,7 @@ _BY_CODE = {kind.code: kind for kind in GraspError.__subclasses__()}
 
 def trailers(error: grpc.RpcError) -> dict[str, Any]:
     """The trailing metadata of a failed call."""
-    metadata: Iterable[Any] = error.trailing_metadata() or ()
+    metadata: Any = error.trailing_metadata() or ()
     return {key: value for key, value in metadata}
 
 

@@ -1,4 +1,4 @@
-"""Packed grasps, which replicate a grasp to other players in some 57 bytes: `output.packed` of a request, `Grasp.packed` of its answer."""
+"""Packed grasps, which replicate a grasp to other players in some 57 bytes."""
 
 from __future__ import annotations
 

@@ -39,8 +39,8 @@ class Attempts:
         self._end = None if timeout is None else time.monotonic() + timeout
         self._count = 0
 
-    def remaining(self) -> float | None:
-        """Seconds left for the next attempt; None without a limit."""
+    def begin(self) -> float | None:
+        """Begins the next attempt; returns the seconds left for it, None without a limit."""
         self._count += 1
         return None if self._end is None else max(self._end - time.monotonic(), 0)
 

@@ -54,7 +54,7 @@ class Track:
         self._call = call
         self._channel = channel
         self._message = message
-        self._convention = convention
+        self._convention: Convention | None = convention
         self._timeout = timeout
         self._retry = retry
         self._lock = threading.Lock()
@@ -85,7 +85,7 @@ class Track:
             frame = requests.frame(self._sequence, self._convention, options)
         attempts = Attempts(self._retry, self._timeout)
         while not self._name:
-            left = attempts.remaining()
+            left = attempts.begin()
             stream = self._opened()
             try:
                 return TrackAnswer(stream.push(frame, left or 0))
