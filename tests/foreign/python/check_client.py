@@ -135,7 +135,7 @@ def test_streams_every_better_grasp_then_the_outcome(either):
 
 
 def test_tracks_a_giver_who_moves(either):
-    with either.track("objects/remote", receiver="right", convention="unity", timeout=5) as track:
+    with either.track("objects/remote", receiver="right", convention="unity", budget=2, timeout=9) as track:
         for frame in range(20):
             pose = HELD_UP.copy()
             pose[1, 3] += 0.002 * frame
@@ -147,9 +147,11 @@ def test_tracks_a_giver_who_moves(either):
         assert "client_from_object" in lost.message.warnings[0]
     with pytest.raises(grasp.NotFound, match="ended"):
         track.push()
-    with either.track("objects/nothing", up=[0, 0, 0]) as track, pytest.raises(grasp.InvalidArgument) as refused:
-        track.push()
-    assert {violation.field for violation in refused.value.violations} >= {"track.holdout.up"}
+    # However the refusal and the frame meet on their way.
+    for _ in range(30):
+        with either.track("objects/nothing", up=[0, 0, 0]) as track, pytest.raises(grasp.InvalidArgument) as refused:
+            track.push()
+        assert "track.holdout.up" in {violation.field for violation in refused.value.violations}
 
 
 def test_the_latest_frame_wins():
@@ -176,7 +178,7 @@ def test_the_latest_frame_wins():
 
 def test_tracks_without_streams_in_both_directions(kind):
     with gateway_to(ADDRESS) as (gateway, through), opened(kind, through) as client:
-        with client.track("objects/remote", receiver="right") as track:
+        with client.track("objects/remote", receiver="right", budget=2) as track:
             assert [track.push().status for _ in range(3)] == ["replanned", "kept", "kept"]
         assert gateway.methods == ["TrackHoldout", "CreateTrack", *["PushFrame"] * 3, "DeleteTrack"]
 

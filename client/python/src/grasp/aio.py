@@ -12,6 +12,7 @@ import grpc.aio
 from typing_extensions import Self, Unpack
 
 from . import methods, requests, v1
+from .aio_errors import ServerStatus
 from .aio_track import AsyncTrack
 from .client import CHANNEL_OPTIONS
 from .methods import Method, Request, Response
@@ -163,8 +164,17 @@ class AsyncObjects:
         if parts is None:
             return await client._call(methods.CREATE_OBJECT, prepared)
         method = methods.UPLOAD_OBJECT
-        send = client._channel.stream_unary(method.path, method.request.SerializeToString, method.response.FromString)
-        return await client._repeat(prepared, lambda left: send(parts(), timeout=left))
+        start = client._channel.stream_unary(method.path, method.request.SerializeToString, method.response.FromString)
+
+        async def send(left: float | None) -> v1.GraspObject:
+            call = start(parts(), timeout=left)
+            status = ServerStatus(call)
+            try:
+                return await call
+            except grpc.aio.AioRpcError as error:
+                raise await status.error(error) from None
+
+        return await client._repeat(prepared, send)
 
     async def get(self, name: str) -> v1.GraspObject:
         """As `Objects.get`."""

@@ -12,6 +12,7 @@ import grpc.aio
 from typing_extensions import Self, Unpack
 
 from . import methods, requests, v1
+from .aio_errors import ServerStatus
 from .errors import NotFound, Unimplemented
 from .methods import Method, Request, Response
 from .poses import Convention
@@ -104,6 +105,7 @@ class _Stream:
         method = methods.TRACK_HOLDOUT
         start = channel.stream_stream(method.path, method.request.SerializeToString, method.response.FromString)
         self._call = start(self._frames())
+        self._status = ServerStatus(self._call)
         self._reader = asyncio.create_task(self._read())
 
     async def push(self, frame: v1.TrackFrame, timeout: float) -> v1.TrackAnswer:
@@ -149,8 +151,11 @@ class _Stream:
                     self._answer = answer
                     self.answers_read += 1
                     self._changed.notify_all()
-        except (grpc.RpcError, asyncio.CancelledError) as error:
-            failure = error if isinstance(error, Exception) else ended()
+        except grpc.aio.AioRpcError as error:
+            failure = await self._status.error(error)
+        except asyncio.CancelledError:
+            # By close.
+            pass
         await self._end(failure)
 
     async def _end(self, failure: Exception) -> None:
