@@ -27,7 +27,7 @@ ENVIRONMENT = {
 
 
 def run(*command, cwd=ROOT, **environment):
-    """Runs a command; returns what it printed."""
+    """Runs a command; returns its output."""
     done = subprocess.run(
         list(map(str, command)),
         cwd=cwd,
@@ -48,7 +48,7 @@ def blocks(language):
 
 @pytest.fixture(scope="module")
 def venv():
-    """A virtual environment with the package, built from its source distribution, and what checks it."""
+    """A virtual environment with the package, built from its source distribution, and the tools that check it."""
     if not (WORK / "wheels.txt").exists():
         pytest.skip("the packages for it are not installed: see tests/foreign/install/python.sh")
     python = WORK / "venv/bin/python"

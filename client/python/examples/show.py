@@ -2,7 +2,7 @@
 
     python client/python/examples/show.py localhost:50051
 
-Needs `pip install "client/python[show]"` and the checkout, for its requests and skins of hands. `--once` builds the scene and exits.
+Needs `pip install trimesh viser`, and the checkout for its requests and skins of hands. `--once` builds the scene and exits.
 """
 
 import argparse
@@ -66,7 +66,7 @@ class Skin:
 
 
 class Show:
-    """The page: who holds what, and which hand takes it."""
+    """The page: controls, and the scene of the chosen handover."""
 
     def __init__(self, client: grasp.Client, port: int) -> None:
         self.client = client
@@ -122,7 +122,7 @@ class Show:
                 self.report.content = f"{result.outcome}: {result.message.report.attempts} attempts"
 
     def draw_object(self, holdout: v1.Holdout) -> None:
-        """The mesh that searches use; what must not be touched is red."""
+        """The mesh that searches use; forbidden surfaces are red."""
         pose = holdout.client_from_object
         q, position = pose.orientation, pose.position
         loaded = trimesh.load_scene(io.BytesIO(self.client.objects.mesh(holdout.object)), file_type="glb")

@@ -1,5 +1,5 @@
-# To be sourced. Installs what the tests of the Python package need into target/foreign/python: a virtual environment to check it
-# in, and the wheels from which pip installs it into a fresh one.
+# To be sourced. Installs the packages for tests of the Python package into target/foreign/python: a virtual environment to
+# check it in, and the wheels from which pip installs it into a fresh one.
 install_python() {
     if ! bash -euo pipefail -c '
         work=target/foreign/python

@@ -22,7 +22,7 @@ _LOOKS, _PAUSE = 50, 0.002
 
 
 class ServerStatus:
-    """Remembers what became of a call."""
+    """Remembers each status that a call gets."""
 
     def __init__(self, call: grpc.aio.Call) -> None:
         self._heard: list[grpc.aio.AioRpcError] = []

@@ -3,8 +3,8 @@
 Every function takes numpy arrays with any leading dimensions, and names of conventions: `conventions.points(p, "unity", "openxr")`
 converts from Unity's axes to OpenXR's. Conversions from any convention to any other one are exact up to rounding.
 
-What is in the client's frame (the default) and what is in an object's frame (`at_object=True`) differ for "unity_flip_x" and
-"unreal_xzy": importers there turn meshes, and with them the frames of objects.
+Points in an object's frame, such as contacts, need `at_object=True`: for "unity_flip_x" and "unreal_xzy", importers turn meshes, and
+with them the frames of objects.
 """
 
 from __future__ import annotations

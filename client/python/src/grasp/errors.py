@@ -17,7 +17,7 @@ Detail = TypeVar("Detail", error_details_pb2.BadRequest, error_details_pb2.Error
 
 @dataclass(frozen=True)
 class Violation:
-    """What is wrong with a field of a request."""
+    """A fault in a field of a request."""
 
     #: The field's path, such as "holdout.client_from_object.position".
     field: str

@@ -46,13 +46,13 @@ M = TypeVar("M", bound=Message)
 class CallOptions(TypedDict, total=False):
     """Options of every call."""
 
-    #: Seconds until the call fails with `DeadlineExceeded`, retries included; a search ends 5 ms earlier with what it has. By
+    #: Seconds until the call fails with `DeadlineExceeded`, retries included; a search ends some 5 ms earlier, without an error. By
     #: default, the client's timeout, and the budget.
     timeout: float | None
 
 
 class FrameOptions(TypedDict, total=False):
-    """What moves around an object."""
+    """The parts of a holdout that move."""
 
     #: The object's pose in the client's frame. By default the identity.
     client_from_object: PoseLike | None
@@ -121,7 +121,7 @@ class StreamOptions(HoldoutOptions, SearchOptions, total=False):
     max_rate_hz: float | None
     #: Instead, this many of the best ones that differ, at the end of the budget and best first: 1 to 32.
     alternatives: int | None
-    #: By what those differ. By default by approach.
+    #: Properties by which those differ. By default the approach.
     differ_by: Sequence[Literal["approach", "type", "region"]]
 
 
@@ -281,7 +281,7 @@ def frame(sequence: int, convention: Convention | None, options: PushOptions) ->
 def create_object(
     name: str, mesh: Mesh, mass_kg: float, options: CreateOptions
 ) -> tuple[Prepared[v1.CreateObjectRequest], Callable[[], Iterator[v1.UploadObjectRequest]] | None]:
-    """The request and, if the mesh is sent in pieces, what makes the parts of an attempt."""
+    """The request and, if the mesh is sent in pieces, a function that yields the parts, for each attempt anew."""
     content = mesh if isinstance(mesh, bytes) else Path(mesh).read_bytes()
     progress = options.get("progress")
     described = v1.GraspObject(

@@ -80,7 +80,7 @@ class FindResult:
 
     def __init__(self, message: v1.FindGraspResponse) -> None:
         self.message = message
-        #: The grasp; two if both hands hold the object; none if none was found in time.
+        #: The grasp; two if both hands hold the object; empty if none was found in time.
         self.grasps = [Grasp(grasp) for grasp in message.grasps]
 
     @property
@@ -107,7 +107,7 @@ class TrackAnswer:
 
     @property
     def status(self) -> str:
-        """What became of the grasp: "kept", "adjusted", "replanned", "none" or "aborted"."""
+        """The status of the grasp: "kept", "adjusted", "replanned", "none" or "aborted"."""
         return v1.CurrentGraspStatus.Name(self.message.current.status).removeprefix("CURRENT_GRASP_STATUS_").lower()
 
     def __repr__(self) -> str:
