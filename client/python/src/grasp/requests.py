@@ -1,4 +1,4 @@
-"""The options of calls, and the messages that they become. None is as good as absent everywhere."""
+"""The options of calls, and the messages that they become. None, where it is allowed, is as good as absent."""
 
 from __future__ import annotations
 
