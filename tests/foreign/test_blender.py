@@ -75,7 +75,8 @@ def test_packed_grasps_have_the_hand_and_its_joints(vector):
         assert_near(wrist, messages.pose(grasp["hand"]["objectFromWrist"]), 5e-4, math.radians(0.5))
         for posed, meters in ((grasp["hand"], 1e-5), (hand, 5e-4)):
             at = messages.pose(posed["objectFromWrist"])
-            for joint, exact in zip(kinematics.joints_of(GOLDEN["rigs"][posed["rig"]], posed), grasp["hand"]["joints"], strict=True):
+            joints = kinematics.joints_of(GOLDEN["rigs"][posed["rig"]], posed)
+            for joint, exact in zip(joints, grasp["hand"]["joints"], strict=True):
                 assert math.dist(axes.composed(at, joint)[0], exact[0]) < meters
     for wrong in (b"", packed[:30], b"\2" + packed[1:], packed + b"\0"):
         with pytest.raises(ValueError):
@@ -133,6 +134,11 @@ NAMES = {
 }
 
 
+def other_side(name):
+    """The name of the right hand's bone."""
+    return re.sub(r"Left|(?<![A-Za-z])[Ll](?![A-Za-z])", lambda side: {"Left": "Right", "L": "R", "l": "r"}[side[0]], name)
+
+
 @pytest.mark.parametrize("naming", sorted(NAMES))
 def test_bones_are_found_by_their_names(naming):
     wrist, thumb, fingers = NAMES[naming]
@@ -141,9 +147,8 @@ def test_bones_are_found_by_their_names(naming):
         rig += [bones.Bone(name, parent) for name, parent in zip(chain, [wrist, *chain])]
     if naming != "WebXR":
         # The other hand, and bones that only move others.
-        swapped = [bones.Bone(*(name and re.sub(r"L(?=eft|_|$)|(?<=_)l$|(?<=_)L(?=_)", "R", name) for name in bone[:2])) for bone in rig[1:]]
-        rig += [bones.Bone(bone.name.replace("Reft", "Right"), bone.parent and bone.parent.replace("Reft", "Right")) for bone in swapped]
-        rig += [bones.Bone(f"ORG-{fingers[0][0]}", "root"), bones.Bone(f"MCH-{thumb[0]}", "root")]
+        rig += [bones.Bone(other_side(bone.name), bone.parent and other_side(bone.parent)) for bone in rig[1:]]
+        rig += [bones.Bone(f"{kind}-{chain[0].removeprefix('DEF-')}") for kind in ("ORG", "MCH") for chain in (thumb, *fingers)]
     found = bones.joint_bones(rig, "HANDEDNESS_LEFT")
     assert found[0] is None and found[1] == (wrist, "head")
     for digit, chain in enumerate((thumb, *fingers)):
@@ -210,3 +215,8 @@ def test_blender_takes_the_manifest(bpy_python):
     ended_well([sys.executable, str(ADD_ON / "build.py"), "target/grasp-blender.zip"])
     (checker,) = PYTHON.parents[1].glob("lib/*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
     ended_well([bpy_python, str(checker), "validate", "target/grasp-blender.zip"])
+
+
+def test_every_file_that_the_readme_links_exists():
+    for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", README):
+        assert (ADD_ON / target).exists(), target

@@ -38,17 +38,19 @@ def built_in(context, role, handedness, rig):
             return item
     file = next(folder / f"{skin}_{side(handedness)}.glb" for folder in _FOLDERS if folder.is_dir())
     armature, skinned = _imported(context, file)
+    _turn_bones_along_fingers(context, armature)
     for item in (armature, skinned):
         for owner in list(item.users_collection):
             owner.objects.unlink(item)
         scenes.collection(context).objects.link(item)
         item.name = f"Grasp {role} {side(handedness)}" + (" skin" if item is skinned else "")
     armature[_ROLE] = key
-    _turn_bones_along_fingers(context, armature)
     armature.data.display_type = "STICK"
     material = bpy.data.materials.get(f"Grasp {role}") or bpy.data.materials.new(f"Grasp {role}")
     material.diffuse_color = _COLORS[role]
-    if bsdf := material.node_tree and material.node_tree.nodes.get("Principled BSDF"):
+    if material.node_tree is None:
+        material.use_nodes = True
+    if bsdf := material.node_tree.nodes.get("Principled BSDF"):
         bsdf.inputs["Base Color"].default_value = _COLORS[role]
         bsdf.inputs["Roughness"].default_value = 0.6
     skinned.data.materials.clear()

@@ -9,8 +9,8 @@ _JOINTS = ("base_yaw", "base_pitch", "second_pitch", "third_pitch")
 
 
 def yaml(object_name, grasps):
-    """The file of grasps in the object's frame, best first: the wrist is the gripper's frame, joints are named after the digit
-    and the angle ("index_base_pitch"); the pre-grasp is the open hand at the object."""
+    """The file of grasps in the object's frame and OpenXR's axes, best first: the wrist is the gripper's frame, joints are named
+    after the digit and the angle ("index_base_pitch"); the pre-grasp is the open hand at the object."""
     lines = [
         "format: isaac_grasp",
         "format_version: 1.0",

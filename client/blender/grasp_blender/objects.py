@@ -8,7 +8,7 @@ from .connect import GraspError
 
 # The label by which objects of this add-on are known: a hash of the mesh that was sent.
 _MESH_LABEL = "blender-mesh"
-_CHANGEABLE = ("massKg", "friction", "regions")
+_CHANGEABLE = ("massKg", "centerOfMass", "friction", "regions")
 
 
 def object_name(text):
@@ -49,19 +49,22 @@ def ensure(client, wanted, mesh):
 
 def _changed(client, present, wanted):
     """The object after an update of what differs."""
-    mask = [field for field in _CHANGEABLE if not _same(present.get(field), wanted.get(field))]
-    if not mask:
+    changes = {field: wanted[field] for field in _CHANGEABLE if field in wanted and not _same(present.get(field), wanted[field])}
+    if not changes:
         return present
-    kept = {key: wanted[key] for key in mask if key in wanted}
-    update = {"object": {"name": wanted["name"], "etag": present["etag"], **kept}, "updateMask": ",".join(mask)}
+    update = {"object": {"name": wanted["name"], "etag": present["etag"], **changes}, "updateMask": ",".join(changes)}
     return client.call("ObjectService/UpdateObject", update)
 
 
 def _same(present, wanted):
-    """Whether values agree; numbers come back in single precision."""
-    if isinstance(present, float) and isinstance(wanted, (int, float)):
-        return abs(present - wanted) <= 1e-6 * abs(wanted)
-    return (present or None) == (wanted or None)
+    """Whether values agree; numbers come back in single precision, and zeros and empty lists are left out."""
+    if isinstance(wanted, dict):
+        return all(_same((present or {}).get(key), wanted.get(key)) for key in {*(present or {}), *wanted})
+    if isinstance(wanted, list):
+        return len(present or ()) == len(wanted) and all(map(_same, present or (), wanted))
+    if isinstance(wanted, (int, float)):
+        return abs((present or 0) - wanted) <= 1e-6 * abs(wanted)
+    return present == wanted
 
 
 def set_known_grips(client, name, change):

@@ -115,7 +115,7 @@ def show(context, item, grasp):
 class GRASP_OT_keep(OfMesh, bpy.types.Operator):
     bl_idname = "grasp.keep"
     bl_label = "Keep as Known Grip"
-    bl_description = "Keeps the grasp that is shown with its object on the server: it is tried before all others, or never answered"
+    bl_description = "Keeps the chosen grasp with its object on the server: it is tried before all others, or never answered"
 
     name: StringProperty(name="Name", default="grip", maxlen=63)
     preferred: BoolProperty(name="Preferred", description="Else banned", default=True)
@@ -173,7 +173,8 @@ class GRASP_OT_prefer(OfKnown, bpy.types.Operator):
         known = _known(context)
 
         def change(grips):
-            return [grip | {"preference": _preference(not known.preferred)} if grip["name"] == known.name else grip for grip in grips]
+            changed = {"preference": _preference(not known.preferred)}
+            return [grip | changed if grip["name"] == known.name else grip for grip in grips]
 
         session.list_known(context, objects.set_known_grips(session.client(context), session.object_name(context.object), change))
 
@@ -245,13 +246,20 @@ class GRASP_OT_create_rig(Asking, bpy.types.Operator):
             {"node": bone.name, "joint": bone.joint} for bone in hands.bones_of(armature) if bone.joint in JOINT_NAMES
         ]
         server = session.client(context)
+        if session.rig_of(armature) == f"rigs/{name}":
+            try:
+                server.call("HandRigService/DeleteRig", {"name": f"rigs/{name}"})
+            except GraspError as error:
+                if error.code != "not_found":
+                    raise
         try:
-            server.call("HandRigService/DeleteRig", {"name": f"rigs/{name}"})
+            rig = server.call("HandRigService/CreateRig", request)
         except GraspError as error:
-            if error.code != "not_found":
-                raise
-        rig = server.call("HandRigService/CreateRig", request)
-        session.set_rig(armature, rig["name"])
+            # A rig of that name from elsewhere stays.
+            if error.code == "already_exists":
+                raise GraspError(error.code, f"rigs/{name} is another armature's: rename this one") from None
+            raise
+        session.set_rig(armature, rig)
         for warning in rig.get("warnings", ()):
             self.report({"WARNING"}, warning)
 

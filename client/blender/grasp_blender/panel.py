@@ -129,6 +129,7 @@ class GRASP_PT_bake(GraspPanel, bpy.types.Panel):
 
     def draw(self, context):
         column, settings = self.begin(context)
+        column.prop(settings, "folder")
         column.row().prop(settings, "formats")
         column.prop(settings, "mass_kg")
         column.prop(settings, "z_up")

@@ -63,7 +63,9 @@ class GraspSettings(bpy.types.PropertyGroup):
     """Who gives, who takes, and how."""
 
     address: StringProperty(name="Server", description="Address of the Grasp server", default="http://127.0.0.1:50051")
-    timeout: FloatProperty(name="Timeout", description="Longest time for a call", default=10.0, min=0.5, max=120.0, subtype="TIME_ABSOLUTE")
+    timeout: FloatProperty(
+        name="Timeout", description="Longest time for a call", default=10.0, min=0.5, max=120.0, subtype="TIME_ABSOLUTE"
+    )
 
     giver: EnumProperty(name="Giver", description="Who holds the object out", items=_GIVERS)
     giver_file: StringProperty(name="File", description="A hand or a recording in JSON", subtype="FILE_PATH")
@@ -73,9 +75,14 @@ class GraspSettings(bpy.types.PropertyGroup):
     hand: EnumProperty(name="Hand", description="The hand that takes the object", items=_EITHER)
     scale: FloatProperty(name="Size", description="The hand's size over its rig's", default=1.0, min=0.5, max=2.0)
     armature: PointerProperty(
-        name="Own hand", description="A character's armature, after Create Rig; empty: the built-in hand", type=bpy.types.Object, poll=_is_armature
+        name="Own Hand",
+        description="A character's armature, after Create Rig; empty: the built-in hand",
+        type=bpy.types.Object,
+        poll=_is_armature,
     )
-    budget: FloatProperty(name="Budget", description="Longest time for a search", default=1.0, min=0.001, max=60.0, subtype="TIME_ABSOLUTE")
+    budget: FloatProperty(
+        name="Budget", description="Longest time for a search", default=1.0, min=0.001, max=60.0, subtype="TIME_ABSOLUTE"
+    )
     alternatives: IntProperty(name="Grasps", description="Number of grasps that differ by side and type", default=1, min=1, max=32)
 
     found: CollectionProperty(type=GraspFound)
@@ -83,6 +90,7 @@ class GraspSettings(bpy.types.PropertyGroup):
     chosen: IntProperty(name="Grasp", description="The grasp that is shown", update=_chosen, options=set())
 
     key_length: IntProperty(name="Frames", description="Frames from each key to the next", default=12, min=1)
+    folder: StringProperty(name="Folder", description="Of OBJ, STL, PLY, GLB and glTF files", subtype="DIR_PATH")
     formats: EnumProperty(name="Formats", items=_FORMATS, options={"ENUM_FLAG"}, default={"json"})
     mass_kg: FloatProperty(name="Mass", description="Of each object without a NAME.toml", default=0.2, min=0.001, max=1000.0)
     z_up: BoolProperty(name="OBJ, PLY and STL are Z up", description="Unless NAME.toml says so")

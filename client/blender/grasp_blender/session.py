@@ -11,7 +11,7 @@ from .connect import Client, GraspError
 from .messages import grasp_in_object, vector_json
 
 _LOOPBACK = ("localhost", "127.0.0.1", "::1")
-_RIG = "grasp_rig"
+_RIG, _HANDS = "grasp_rig", "grasp_hands"
 
 
 def client(context):
@@ -84,16 +84,26 @@ def receiver(context):
     """The receiver of the settings."""
     settings = context.scene.grasp
     message = {"handedness": settings.hand, "scale": settings.scale}
-    if settings.armature is not None:
-        message["rig"] = settings.armature.get(_RIG, "")
-        if not message["rig"]:
-            raise GraspError("invalid_argument", f"Create Rig first: no rig is known of {settings.armature.name}")
+    if (own := settings.armature) is not None:
+        if _RIG not in own:
+            raise GraspError("failed_precondition", f"Create Rig first: no rig is known of {own.name}")
+        message["rig"], sides = own[_RIG], list(own[_HANDS])
+        if len(sides) == 1 and settings.hand == "HANDEDNESS_UNSPECIFIED":
+            message["handedness"] = sides[0]
+        elif len(sides) == 1 and settings.hand != sides[0]:
+            raise GraspError("invalid_argument", f"{own.name} has a {hands.side(sides[0])} hand only")
     return message
 
 
+def rig_of(armature):
+    """The name of the rig that was created from an armature, or None."""
+    return armature.get(_RIG)
+
+
 def set_rig(armature, rig):
-    """Notes the rig that was created from an armature."""
-    armature[_RIG] = rig
+    """Notes the rig that was created from an armature, and the hands that it has bones of."""
+    armature[_RIG] = rig["name"]
+    armature[_HANDS] = [side["handedness"] for side in rig["hands"] if side.get("nodes")]
 
 
 def show_giver(context, item, given):

@@ -4,7 +4,6 @@ import pathlib
 import time
 
 import bpy
-from bpy.props import StringProperty
 
 from . import bake, motion, session
 from .connect import GraspError
@@ -68,18 +67,11 @@ class GRASP_OT_bake(Stepped, bpy.types.Operator):
     bl_description = "Writes grasps beside every OBJ, STL, PLY, GLB and glTF file of a folder"
     bl_options = {"REGISTER"}
 
-    directory: StringProperty(subtype="DIR_PATH")
-
-    def invoke(self, context, event):
-        if self.directory:
-            return super().invoke(context, event)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
     def steps(self, context):
-        settings, folder = context.scene.grasp, pathlib.Path(bpy.path.abspath(self.directory))
-        if not folder.is_dir():
-            raise GraspError("invalid_argument", f"{folder} is no folder")
+        settings = context.scene.grasp
+        folder = pathlib.Path(bpy.path.abspath(settings.folder))
+        if not settings.folder or not folder.is_dir():
+            raise GraspError("invalid_argument", f"{settings.folder or 'Folder'} is no folder")
         files = bake.meshes(folder)
         if not files:
             raise GraspError("invalid_argument", f"{folder} has no meshes")
