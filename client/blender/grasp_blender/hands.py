@@ -1,5 +1,6 @@
 """Hands in Blender's scene: the built-in ones with their skin, and armatures that givers and receivers have."""
 
+import math
 import pathlib
 
 import bpy
@@ -20,7 +21,7 @@ _COLORS = {"giver": (0.16, 0.33, 0.65, 1.0), "receiver": (0.62, 0.36, 0.25, 1.0)
 _METACARPAL = 1 / 3
 # The thumb's base in the wrist's frame of a relaxed left hand.
 _LEFT_THUMB = (-0.01946, -0.34358, -0.69103, 0.63565)
-_ROLE = "grasp_hand"
+_ROLE, _SIZE = "grasp_hand", "grasp_size"
 
 
 def side(handedness):
@@ -98,7 +99,7 @@ def _turn_bones_along_fingers(context, armature):
     for bone in armature.data.edit_bones:
         ahead = [child.head for child in bone.children]
         length = (ahead[len(ahead) // 2] - bone.head).length if ahead else 0.008
-        turned = bone.matrix @ Matrix.Rotation(-1.5707963267948966, 4, "X")
+        turned = bone.matrix @ Matrix.Rotation(-math.pi / 2, 4, "X")
         bone.matrix = turned
         bone.length = length
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -137,50 +138,81 @@ def pose_joints(context, armature, joints, scale=1.0):
 
 
 
-def pose_model(context, armature, at, hand):
-    """Poses the user's armature, from which the hand's rig was created, at an object: its fingers, and the bone of the hand.
-
-    An armature without an arm moves as a whole. The arm of a character follows the empty "Grasp LEFT" or "Grasp RIGHT" by an
-    IK constraint that is named "Grasp". Returns what moved, the armature's bones first.
-    """
+def pose_model(context, armature, at, hand, elbow=None):
+    """Poses the user's armature, from which the hand's rig was created, at an object: an armature without an arm moves as a whole;
+    the arm of a character bends, with the elbow toward a point in the object's frame. Returns what moved, bones first."""
     (root, root_pose), nodes = hand["model"][0], hand["model"][1:]
-    size = hand.get("scale", 1.0)
-    bones, moved = armature.pose.bones, []
-    for name, turn in nodes:
-        if (bone := bones.get(name)) is None or bone.parent is None:
-            continue
-        at_rest = (bone.parent.bone.matrix_local.inverted() @ bone.bone.matrix_local).to_quaternion()
-        x, y, z, w = turn
-        bone.rotation_mode = "QUATERNION"
-        bone.rotation_quaternion = at_rest.inverted() @ Quaternion((w, x, y, z))
-        moved.append(bone)
-    # The root has the file's axes: only its place in the world is turned to Blender's.
+    bones, moved, size = armature.pose.bones, [], hand.get("scale", 1.0)
+    for name, (x, y, z, w) in nodes:
+        if (bone := bones.get(name)) is not None and bone.parent is not None:
+            moved.append(bone)
+            bone.rotation_mode = "QUATERNION"
+            bone.rotation_quaternion = _at_rest(bone).to_quaternion().inverted() @ Quaternion((w, x, y, z))
+    # The root has the file's axes: only its place is turned to Blender's.
     position, (x, y, z, w) = root_pose
-    axes = Matrix.Rotation(1.5707963267948966, 4, "X")
-    wanted = axes @ Matrix.LocRotScale(
-        Vector(position) * scenes.units_per_meter(context), Quaternion((w, x, y, z)), None
-    )
-    hand_bone = bones[root]
-    if len(hand_bone.parent_recursive) < 2:
-        scale = armature.matrix_world.to_scale().x / armature.get("grasp_scale", 1.0) * size
-        armature["grasp_scale"] = size
-        scenes.place(context, armature, at, wanted @ Matrix.Scale(scale, 4) @ hand_bone.bone.matrix_local.inverted())
+    position = Vector(position) * scenes.units_per_meter(context)
+    wanted = Matrix.Rotation(math.pi / 2, 4, "X") @ Matrix.LocRotScale(position, Quaternion((w, x, y, z)), None)
+    if _arm(bones[root]) is None:
+        scale = armature.matrix_world.to_scale().x / armature.get(_SIZE, 1.0) * size
+        armature[_SIZE] = size
+        scenes.place(context, armature, at, wanted @ Matrix.Scale(scale, 4) @ bones[root].bone.matrix_local.inverted())
         return [*moved, armature]
-    name = f"Grasp {hand['handedness'].removeprefix('HANDEDNESS_')}"
-    target = scenes.collection(context).objects.get(name) or bpy.data.objects.new(name, None)
-    if name not in scenes.collection(context).objects:
-        scenes.collection(context).objects.link(target)
-        target.empty_display_size = 0.05 * scenes.units_per_meter(context)
-    scenes.place(context, target, at, wanted)
-    _constraint(hand_bone.parent, "IK", target).chain_count = 2
-    _constraint(hand_bone, "COPY_ROTATION", target)
-    return [*moved, target]
+    armature_from_object = armature.matrix_world.inverted() @ scenes.frame(at)
+    place, turn, _ = (armature_from_object @ wanted).decompose()
+    if elbow is not None:
+        elbow = armature_from_object @ (Vector(BLENDER.point_from_openxr(elbow)) * scenes.units_per_meter(context))
+    return moved + _bend_arm(context, armature, bones[root], Matrix.LocRotScale(place, turn, (size,) * 3), elbow)
 
 
-def _constraint(bone, kind, target):
-    constraint = bone.constraints.get("Grasp") or bone.constraints.new(kind)
-    constraint.name, constraint.target = "Grasp", target
-    return constraint
+def _bend_arm(context, armature, hand, wanted, elbow):
+    """Poses forearm and upper arm so that a hand is at a matrix, all in the armature's space; returns the three bones."""
+    forearm, upper = _arm(hand)
+    evaluated = armature.evaluated_get(context.evaluated_depsgraph_get()).pose.bones
+    above = evaluated[upper.parent.name].matrix if upper.parent else Matrix()
+    shoulder, wrist = above @ _at_rest(upper).to_translation(), wanted.to_translation()
+    lengths = _at_rest(forearm).to_translation().length, _at_rest(hand).to_translation().length
+    ahead, straight = (wrist - shoulder).normalized(), (wrist - shoulder).length
+    # The two bones and the line from shoulder to wrist are a triangle, whose plane the elbow decides.
+    along = (lengths[0] ** 2 - lengths[1] ** 2 + straight**2) / (2 * straight)
+    side = (elbow or evaluated[forearm.name].head) - shoulder
+    side = (side - side.dot(ahead) * ahead).normalized()
+    elbow = shoulder + along * ahead + math.sqrt(max(0.0, lengths[0] ** 2 - along**2)) * side
+    for bone, below, target in ((upper, forearm, elbow), (forearm, hand, wrist)):
+        at_rest = above @ _at_rest(bone)
+        end = (at_rest @ _at_rest(below)).to_translation()
+        swing = (end - at_rest.to_translation()).rotation_difference(target - at_rest.to_translation())
+        posed = Matrix.LocRotScale(at_rest.to_translation(), swing @ at_rest.to_quaternion(), None)
+        _set(bone, at_rest.inverted() @ posed)
+        above = posed
+    _set(hand, (above @ _at_rest(hand)).inverted() @ wanted)
+    return [hand, forearm, upper]
+
+
+def _at_rest(bone):
+    """The rest pose of a bone in its parent."""
+    return bone.parent.bone.matrix_local.inverted() @ bone.bone.matrix_local if bone.parent else bone.bone.matrix_local
+
+
+def _set(bone, basis):
+    bone.rotation_mode = "QUATERNION"
+    bone.matrix_basis = basis
+
+
+def _arm(hand):
+    """The bones of forearm and upper arm above that of a hand, or None."""
+    return hand.parent_recursive[:2] if len(hand.parent_recursive) >= 2 else None
+
+
+def arm_of(context, armature, root):
+    """The shoulder above the bone of a hand, in OpenXR's axes and the world, and the lengths of upper arm and forearm in meters;
+    None without an arm."""
+    hand, size = armature.pose.bones[root], 1 / scenes.units_per_meter(context)
+    if _arm(hand) is None:
+        return None
+    forearm, upper = _arm(hand)
+    shoulder, elbow, wrist = (armature.matrix_world @ bone.bone.head_local for bone in (upper, forearm, hand))
+    posed = armature.matrix_world @ armature.evaluated_get(context.evaluated_depsgraph_get()).pose.bones[upper.name].head
+    return BLENDER.point_to_openxr(tuple(posed * size)), (elbow - shoulder).length * size, (wrist - elbow).length * size
 
 
 def bones_of(armature):

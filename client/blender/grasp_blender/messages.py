@@ -77,7 +77,7 @@ def hand_in_object(hand, convention, client_from_object):
 
 
 def grasp_in_object(grasp, convention="CONVENTION_OPENXR", client_from_object=axes.IDENTITY):
-    """A Grasp in OpenXR's axes and the object's frame. client_from_object is in OpenXR's axes."""
+    """A Grasp in OpenXR's axes, all in the object's frame. client_from_object is in OpenXR's axes."""
     engine = CONVENTIONS[convention]
     contacts = []
     for contact in grasp.get("contacts", ()):
@@ -90,8 +90,12 @@ def grasp_in_object(grasp, convention="CONVENTION_OPENXR", client_from_object=ax
                 "force": engine.in_object_to_openxr(vector(contact.get("force"))),
             }
         )
+    elbow = grasp.get("arm", {}).get("clientElbow")
+    if elbow is not None:
+        elbow = composed(inverse(client_from_object), (engine.point_to_openxr(vector(elbow)), axes.IDENTITY[1]))[0]
     return {
         "hand": hand_in_object(grasp["hand"], convention, client_from_object),
+        "elbow": elbow,
         "contacts": contacts,
         "type": grasp.get("type", "GRASP_TYPE_UNSPECIFIED").removeprefix("GRASP_TYPE_").replace("_", " ").capitalize(),
         "score": grasp.get("score", 0.0),

@@ -70,7 +70,7 @@ class GRASP_OT_find(OfMesh, bpy.types.Operator):
         given = session.holdout(context, item)
         request = {
             "holdout": given.message,
-            "receiver": session.receiver(context),
+            "receiver": session.receiver(context, given.convention, session.client_from_world(context, item, given)),
             "search": {"budget": f"{settings.budget:.3f}s"},
             "output": {"convention": given.convention},
         }
@@ -108,7 +108,7 @@ def show_chosen(context):
 
 def show(context, item, grasp):
     """Shows a grasp: hand, contacts and forces."""
-    session.show_receiver(context, item, grasp["hand"])
+    session.show_receiver(context, item, grasp["hand"], grasp["elbow"])
     contacts.show(context, item, grasp["contacts"])
 
 
@@ -223,7 +223,7 @@ class GRASP_OT_key(Asking, bpy.types.Operator):
         show(context, settings.found_at, grasp)
         keys, frame = motion.Keys(), context.scene.frame_current
         for _, hand in grasp["keyFrames"]:
-            keys.add(session.show_receiver(context, settings.found_at, hand), frame)
+            keys.add(session.show_receiver(context, settings.found_at, hand, grasp["elbow"]), frame)
             frame += settings.key_length
         keys.make_linear()
 

@@ -1,12 +1,13 @@
 """What operators ask the server for, with the panel's settings."""
 
 import json
+import math
 import urllib.parse
 
 import bpy
 
 from . import hands, objects, recordings, scenes
-from .axes import CONVENTIONS
+from .axes import CONVENTIONS, IDENTITY, composed, inverse
 from .connect import Client, GraspError
 from .messages import grasp_in_object, vector_json
 
@@ -80,19 +81,33 @@ def holdout(context, item):
     return given._replace(message=message)
 
 
-def receiver(context):
-    """The receiver of the settings."""
+def receiver(context, convention="CONVENTION_OPENXR", client_from_world=None):
+    """The receiver of the settings: of a character in the scene, with its arm, if the world's pose in the client's frame is known
+    (in OpenXR's axes; the answer is in the convention's)."""
     settings = context.scene.grasp
     message = {"handedness": settings.hand, "scale": settings.scale}
-    if (own := settings.armature) is not None:
-        if _RIG not in own:
-            raise GraspError("failed_precondition", f"Create Rig first: no rig is known of {own.name}")
-        message["rig"], sides = own[_RIG], list(own[_HANDS])
-        if len(sides) == 1 and settings.hand == "HANDEDNESS_UNSPECIFIED":
-            message["handedness"] = sides[0]
-        elif len(sides) == 1 and settings.hand != sides[0]:
-            raise GraspError("invalid_argument", f"{own.name} has a {hands.side(sides[0])} hand only")
-    return message
+    if (own := settings.armature) is None:
+        return message
+    if _RIG not in own:
+        raise GraspError("failed_precondition", f"Create Rig first: no rig is known of {own.name}")
+    message["rig"], roots = own[_RIG], own[_HANDS].to_dict()
+    sides = [side for side in roots if settings.hand in (side, "HANDEDNESS_UNSPECIFIED")]
+    if not sides:
+        raise GraspError("invalid_argument", f"{own.name} has no {hands.side(settings.hand)} hand")
+    arms = [(side, hands.arm_of(context, own, roots[side])) for side in sides]
+    if client_from_world is None or None in (arm for _, arm in arms):
+        return message | ({"handedness": sides[0]} if len(sides) == 1 else {})
+    # The arm counts for one side: that which is nearer.
+    engine, at = CONVENTIONS[convention], scenes.pose_of(context, context.object.matrix_world)[0]
+    side, (shoulder, upper, forearm) = min(arms, key=lambda one: math.dist(one[1][0], at))
+    client_shoulder = engine.point_from_openxr(composed(client_from_world, (shoulder, IDENTITY[1]))[0])
+    lengths = {"upperArmLength": upper * engine.units_per_meter, "forearmLength": forearm * engine.units_per_meter}
+    return message | {"handedness": side, "clientShoulder": vector_json(client_shoulder), **lengths}
+
+
+def client_from_world(context, item, given):
+    """The pose of Blender's world in the frame of a client to whom an object is held out, in OpenXR's axes."""
+    return composed(given.client_from_object(), inverse(scenes.pose_of(context, scenes.frame(item))))
 
 
 def rig_of(armature):
@@ -101,9 +116,9 @@ def rig_of(armature):
 
 
 def set_rig(armature, rig):
-    """Notes the rig that was created from an armature, and the hands that it has bones of."""
+    """Notes the rig that was created from an armature, and the bones that are its hands."""
     armature[_RIG] = rig["name"]
-    armature[_HANDS] = [side["handedness"] for side in rig["hands"] if side.get("nodes")]
+    armature[_HANDS] = {side["handedness"]: side["nodes"][0]["node"] for side in rig["hands"] if side.get("nodes")}
 
 
 def show_giver(context, item, given):
@@ -119,12 +134,12 @@ def show_giver(context, item, given):
     return _pose_built_in(context, item, "giver", {"handedness": handedness, "rig": rig, "joints": joints})
 
 
-def show_receiver(context, item, hand):
-    """Shows a receiving hand at an object; returns what moved, an armature or its bones first."""
+def show_receiver(context, item, hand, elbow=None):
+    """Shows a receiving hand at an object, and the elbow of its arm; returns what moved, an armature or its bones first."""
     own = context.scene.grasp.armature
     if hand.get("model") and own is not None and own.get(_RIG) == hand["rig"]:
         hands.hide_others(context, "receiver", None)
-        return hands.pose_model(context, own, item, hand)
+        return hands.pose_model(context, own, item, hand, elbow)
     return _pose_built_in(context, item, "receiver", hand)
 
 

@@ -6,6 +6,7 @@ import time
 import bpy
 
 from . import bake, motion, session
+from .axes import IDENTITY
 from .connect import GraspError
 from .operators import Asking, OfMesh
 from .recordings import Holdout
@@ -100,7 +101,8 @@ class GRASP_OT_track(Stepped, OfMesh, bpy.types.Operator):
         begun = {key: value for key, value in recording.track.items() if key not in ("name", "output", "predictionHorizon")}
         begun |= {
             "holdout": {key: value for key, value in recording.track["holdout"].items() if key == "up"} | {"object": name},
-            "receiver": {**recording.track.get("receiver", {}), **session.receiver(context)},
+            # The recording's frame is the world's.
+            "receiver": session.receiver(context, recording.convention(), IDENTITY),
             "output": {"convention": recording.convention()},
         }
         track = server.call("GraspService/CreateTrack", begun)["name"]
@@ -115,7 +117,8 @@ class GRASP_OT_track(Stepped, OfMesh, bpy.types.Operator):
                 keys.add(session.show_giver(context, item, given), at)
                 taking = None
                 if "grasp" in answer:
-                    moved = session.show_receiver(context, item, session.in_object(answer["grasp"], given)["hand"])
+                    grasp = session.in_object(answer["grasp"], given)
+                    moved = session.show_receiver(context, item, grasp["hand"], grasp["elbow"])
                     keys.add(moved, at)
                     taking = moved[0].id_data
                     receivers.add(taking)
