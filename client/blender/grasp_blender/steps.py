@@ -104,6 +104,8 @@ class GRASP_OT_track(Stepped, OfMesh, bpy.types.Operator):
             # The recording's frame is the world's.
             "receiver": session.receiver(context, recording.convention(), IDENTITY),
             "output": {"convention": recording.convention()},
+            # Nobody waits for frames here.
+            "search": {"budget": f"{scene.grasp.budget:.3f}s", **recording.track.get("search", {})},
         }
         track = server.call("GraspService/CreateTrack", begun)["name"]
         keys, receivers, without, warned = motion.Keys(), set(), 0, set()

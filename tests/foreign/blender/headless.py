@@ -217,6 +217,7 @@ def test_marked_faces_are_not_touched():
         x, y, z = BLENDER.point_from_openxr(contact["position"])
         assert not (x > 0.0205 and y < 0.0201 and z < 0.0201), contact
     attribute.data.foreach_set("value", [False] * 18)
+    item.data.update()
     bpy.ops.grasp.upload()
     present = client().call("ObjectService/GetObject", {"name": "objects/marked"})
     assert [region["name"] for region in present["regions"]] == ["preferred"]
