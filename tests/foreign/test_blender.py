@@ -15,7 +15,7 @@ from conftest import ROOT
 ADD_ON = ROOT / "client/blender"
 sys.path.insert(0, str(ADD_ON))
 
-from grasp_blender import axes, bones, connect, kinematics, messages  # noqa: E402
+from grasp_blender import axes, bones, connect, isaac, kinematics, messages  # noqa: E402
 
 PYTHON = ROOT / "target/foreign/blender/venv/bin/python"
 README = (ADD_ON / "README.md").read_text()
@@ -101,6 +101,18 @@ def test_conventions_are_their_own_inverse(convention):
     engine = axes.CONVENTIONS[convention]
     pose = ((1.0, 2.0, 3.0), axes.product(axes.about(0, 0.3), axes.about(1, 1.2)))
     assert_near(engine.pose_to_openxr(engine.pose_from_openxr(pose)), pose, 1e-12)
+
+
+def test_isaac_files_are_in_the_axes_of_the_objects_file():
+    wrist = {"position": {"x": 0.1, "y": 0.2, "z": 0.3}, "orientation": {"w": 1.0}}
+    hand = {"rig": "rigs/adult", "handedness": "HANDEDNESS_RIGHT", "scale": 1.1, "objectFromWrist": wrist, "thumb": {}}
+    files = isaac.files({"name": "objects/mug", "zUp": True}, [{"hand": hand, "score": 0.5}])
+    assert list(files) == ["right"]
+    lines = files["right"].splitlines()
+    assert "gripper_frame: rigs/adult/right/1.1" in lines
+    # The server makes (x, z, -y) of the file's (x, y, z).
+    assert "    position: [0.1000000, -0.3000000, 0.2000000]" in lines
+    assert "    orientation: {w: 0.70710678, xyz: [0.70710678, 0.00000000, 0.00000000]}" in lines
 
 
 FINGERS = ("index", "middle", "ring", "little")

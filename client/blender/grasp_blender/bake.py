@@ -18,7 +18,8 @@ def meshes(folder):
 
 def bake(client, folder, defaults, request, alternatives=1, formats=("json", "isaac")):
     """Creates an object of each mesh, and writes its grasps beside it: NAME.grasps.json as {"object", "grasps"}, and
-    NAME.grasps.yaml as isaac_grasp. Yields (file, number of grasps, reason why there are none) as it goes.
+    NAME.grasps.left.yaml and NAME.grasps.right.yaml as isaac_grasp. Yields (file, number of grasps, reason why there are none)
+    as it goes.
 
     NAME.toml beside a mesh has fields of its object, as for `grasp bake`; `defaults` are those of the others. `request` has
     receiver, requirements and search of FindGrasp.
@@ -33,8 +34,8 @@ def bake(client, folder, defaults, request, alternatives=1, formats=("json", "is
                 if "json" in formats:
                     content = json.dumps({"object": present["name"], "grasps": grasps}, indent=1)
                     pathlib.Path(stem + ".json").write_text(content + "\n")
-                if "isaac" in formats:
-                    pathlib.Path(stem + ".yaml").write_text(isaac.yaml(file.stem, grasps))
+                for side, content in isaac.files(present, grasps).items() if "isaac" in formats else ():
+                    pathlib.Path(f"{stem}.{side}.yaml").write_text(content)
             yield file, len(grasps), reason
         except (GraspError, OSError, ValueError, TypeError) as error:
             if isinstance(error, GraspError) and error.code == "unavailable":

@@ -21,7 +21,7 @@ _GIVERS = [
 ]
 _FORMATS = [
     ("json", "JSON", "NAME.grasps.json: the server's messages", 1),
-    ("isaac", "Isaac Sim", "NAME.grasps.yaml: isaac_grasp 1.0", 2),
+    ("isaac", "Isaac Sim", "NAME.grasps.left.yaml and NAME.grasps.right.yaml: isaac_grasp 1.0", 2),
 ]
 
 

@@ -414,9 +414,21 @@ def test_a_folder_is_baked(tmp_path):
         for grasp in content["grasps"]:
             hand = {key: value for key, value in grasp["hand"].items() if key not in ("joints", "model")}
             assert client().call("GraspService/ValidateGrasp", {"holdout": {"object": content["object"]}, "pose": hand})["valid"]
-        isaac = yaml.safe_load((tmp_path / f"my {name}.grasps.yaml").read_text())
-        assert (isaac["format"], str(isaac["format_version"]), len(isaac["grasps"])) == ("isaac_grasp", "1.0", 2)
-        for grasp, written in zip(content["grasps"], isaac["grasps"].values()):
+        isaac = [yaml.safe_load(file.read_text()) for file in sorted(tmp_path.glob(f"my {name}.grasps.*.yaml"))]
+        for file in isaac:
+            assert (file["format"], str(file["format_version"])) == ("isaac_grasp", "1.0")
+            assert file["gripper_frame"] in ("rigs/adult/left", "rigs/adult/right")
+        pairs = [
+            (grasp, written)
+            for file in isaac
+            for grasp, written in zip(
+                (grasp for grasp in content["grasps"] if grasp["hand"]["handedness"][11:].lower() == file["gripper_frame"][11:]),
+                file["grasps"].values(),
+                strict=True,
+            )
+        ]
+        assert len(pairs) == 2
+        for grasp, written in pairs:
             position, orientation = messages.pose(grasp["hand"]["objectFromWrist"])
             assert math.dist(written["position"], position) < 1e-6
             assert math.dist((*written["orientation"]["xyz"], written["orientation"]["w"]), orientation) < 1e-6
