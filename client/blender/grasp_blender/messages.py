@@ -85,6 +85,7 @@ def grasp_in_object(grasp, convention="CONVENTION_OPENXR", client_from_object=ax
         contacts.append(
             {
                 "digit": contact.get("digit", "DIGIT_UNSPECIFIED"),
+                "phalanx": contact.get("phalanx", 0),
                 "position": tuple(part / engine.units_per_meter for part in position),
                 "normal": engine.in_object_to_openxr(vector(contact.get("normal"))),
                 "force": engine.in_object_to_openxr(vector(contact.get("force"))),

@@ -123,8 +123,8 @@ def assert_posed(item, armature, joints):
 
 
 def assert_touches(item, armature, grasp):
-    """The contacts lie on the object within 0.1 mm, and on the skin: no more than 1 mm outside of it, and no more than 2 mm
-    inside, by which flesh yields."""
+    """The contacts lie on the object within 0.1 mm, and on the skin: those of fingertips no more than 1 mm outside of it, and no
+    more than 2 mm inside, by which flesh yields; where the skin folds, a millimeter more."""
     mesh, skin = surface(item), surface(next(child for child in armature.children if child.type == "MESH"))
     assert grasp["contacts"]
     for contact in grasp["contacts"]:
@@ -132,7 +132,8 @@ def assert_touches(item, armature, grasp):
         assert meters(point, mesh.find_nearest(point)[0]) < 1e-4
         nearest, normal, _, _ = skin.find_nearest(point)
         outside = meters(point, nearest) * (1 if (point - nearest).dot(normal) > 0 else -1)
-        assert -2e-3 < outside < 1e-3, (contact["digit"], outside)
+        fold = 0 if contact["phalanx"] == 3 else 1e-3
+        assert -2e-3 - fold < outside < 1e-3 + fold, (contact["digit"], contact["phalanx"], outside)
 
 
 def test_a_grasp_is_shown_at_an_object():
@@ -422,7 +423,7 @@ def test_a_folder_is_baked(tmp_path):
             (grasp, written)
             for file in isaac
             for grasp, written in zip(
-                (grasp for grasp in content["grasps"] if grasp["hand"]["handedness"][11:].lower() == file["gripper_frame"][11:]),
+                (grasp for grasp in content["grasps"] if grasp["hand"]["handedness"].lower().endswith(file["gripper_frame"][11:])),
                 file["grasps"].values(),
                 strict=True,
             )
@@ -433,7 +434,9 @@ def test_a_folder_is_baked(tmp_path):
             assert math.dist(written["position"], position) < 1e-6
             assert math.dist((*written["orientation"]["xyz"], written["orientation"]["w"]), orientation) < 1e-6
             assert written["confidence"] == pytest.approx(grasp["score"], abs=1e-5)
-            assert len(written["cspace_position"]) == len(written["pregrasp_cspace_position"]) == 20
+            assert len(written["cspace_position"]) == 20
+            # Where a free way leads to the grasp.
+            assert len(written.get("pregrasp_cspace_position", ())) == (20 if "keyFrames" in grasp else 0)
     scalpel = client().call("ObjectService/GetObject", {"name": "objects/my-scalpel"})
     assert scalpel["massKg"] == pytest.approx(0.02) and scalpel["forbiddenTriangleCount"] > 0
     assert not (tmp_path / "broken.grasps.json").exists()
