@@ -266,11 +266,11 @@ class GRASP_OT_create_rig(Asking, bpy.types.Operator):
 
 def _glb_of(context, armature):
     """A GLB file of an armature at rest with its skins, in meters."""
-    skins = [item for item in context.scene.objects if item.type == "MESH" and item.find_armature() == armature]
+    skins = [item for item in context.view_layer.objects if item.type == "MESH" and item.find_armature() == armature]
     if not skins:
         raise GraspError("invalid_argument", f"{armature.name} has no skin")
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
-    for item in context.scene.objects:
+    for item in context.view_layer.objects:
         item.select_set(item in (armature, *skins))
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / "hand.glb"
@@ -284,7 +284,7 @@ def _glb_of(context, armature):
             export_rest_position_armature=True,
         )
         content = file.read_bytes()
-    for item in context.scene.objects:
+    for item in context.view_layer.objects:
         item.select_set(item in selected)
     context.view_layer.objects.active = active
     return glb.scaled(content, context.scene.unit_settings.scale_length)

@@ -180,6 +180,27 @@ def test_a_golden_request_is_answered_alike():
         assert {key: grasp[key] for key in golden} == golden
 
 
+@pytest.mark.parametrize("convention", sorted(axes.CONVENTIONS))
+def test_answers_in_every_convention_are_shown_alike(convention):
+    one = GOLDEN["vectors"][5]["conventions"][0]
+    hand = {key: value for key, value in one["answer"]["grasps"][0]["hand"].items() if key not in ("joints", "clientFromWrist")}
+    holdout = {"object": one["request"]["holdout"]["object"], "clientFromObject": {"position": {"x": 1, "y": 2, "z": 3}}}
+
+    def shown_in(convention):
+        request = {"holdout": holdout, "pose": hand, "output": {"convention": convention}}
+        answer = client().call("GraspService/ValidateGrasp", request)
+        return session.in_object(answer["grasp"], recordings.Holdout(holdout, convention))
+
+    grasp, expected = shown_in(convention), shown_in("CONVENTION_OPENXR")
+    for joint, same in zip(grasp["hand"]["joints"], expected["hand"]["joints"], strict=True):
+        assert math.dist(joint[0], same[0]) < 1e-5
+        assert abs(abs(sum(a * b for a, b in zip(joint[1], same[1]))) - 1) < 1e-6
+    assert len(grasp["contacts"]) == len(expected["contacts"]) > 1
+    for contact, same in zip(grasp["contacts"], expected["contacts"]):
+        assert math.dist(contact["position"], same["position"]) < 1e-5
+        assert math.dist(contact["normal"], same["normal"]) < 1e-5
+
+
 @pytest.mark.parametrize("case", ["as is", "scaled", "mirrored", "modified", "centimeters"])
 def test_contacts_of_a_chiral_shape_lie_on_it(case):
     item = boxes(f"Chiral {case}")
@@ -468,7 +489,11 @@ def test_an_armature_of_ones_own_takes_objects(heuristic, scale):
     with pytest.raises(RuntimeError, match="Create Rig"):
         bpy.ops.grasp.find()
     without_rig(own.name.lower().replace(" ", "-"))
+    bpy.context.view_layer.objects.active = own
+    bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.grasp.create_rig()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = item
     # Sent again by the same armature, it is replaced; from elsewhere, it is not.
     bpy.ops.grasp.create_rig()
     noted = own.pop("grasp_rig")
