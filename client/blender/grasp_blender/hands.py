@@ -109,8 +109,6 @@ def _turn_bones_along_fingers(context, armature):
 def pose_joints(context, armature, joints, scale=1.0):
     """Poses a built-in hand, which is at an object, like 26 joints in that object's frame: the armature is at the wrist.
     Returns what moved."""
-    moved = [armature, *armature.pose.bones]
-    before = [item.rotation_quaternion.copy() for item in moved]
     size = scale * scenes.units_per_meter(context)
     armature.matrix_basis = scenes.matrix(context, joints[WRIST]) @ Matrix.Scale(size, 4)
     armature_from_object = inverse(joints[WRIST])
@@ -130,12 +128,7 @@ def pose_joints(context, armature, joints, scale=1.0):
             rest = bone.parent.bone.matrix_local.inverted() @ rest
             pose = posed[bone.parent.name].inverted() @ pose
         bone.matrix_basis = rest.inverted() @ pose
-    for item, last in zip(moved, before):
-        # Of the two quaternions of a rotation, the one that keys reach the short way.
-        if item.rotation_quaternion.dot(last) < 0:
-            item.rotation_quaternion.negate()
-    return moved
-
+    return [armature, *armature.pose.bones]
 
 
 def pose_model(context, armature, at, hand, elbow=None):

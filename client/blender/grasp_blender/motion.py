@@ -6,12 +6,18 @@ class Keys:
 
     def __init__(self):
         self._owners = []
+        self._rotations = {}
 
     def add(self, moved, frame):
         """Keys places and rotations of objects and bones of armatures."""
         for item in moved:
             self._own(item.id_data)
             item.rotation_mode = "QUATERNION"
+            # Of the two quaternions of a rotation, the one that is reached the short way from the key before.
+            key = (item.id_data, item.name)
+            if item.rotation_quaternion.dot(self._rotations.get(key, item.rotation_quaternion)) < 0:
+                item.rotation_quaternion.negate()
+            self._rotations[key] = item.rotation_quaternion.copy()
             for path in ("location", "rotation_quaternion"):
                 item.keyframe_insert(path, frame=frame, group=item.name)
 

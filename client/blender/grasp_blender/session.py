@@ -82,8 +82,8 @@ def holdout(context, item):
 
 
 def receiver(context, convention="CONVENTION_OPENXR", client_from_world=None):
-    """The receiver of the settings: of a character in the scene, with its arm, if the world's pose in the client's frame is known
-    (in OpenXR's axes; the answer is in the convention's)."""
+    """The receiver of the settings; a character's has its arm, if the pose of Blender's world in the client's frame is given, in
+    OpenXR's axes."""
     settings = context.scene.grasp
     message = {"handedness": settings.hand, "scale": settings.scale}
     if (own := settings.armature) is None:
@@ -91,15 +91,19 @@ def receiver(context, convention="CONVENTION_OPENXR", client_from_world=None):
     if _RIG not in own:
         raise GraspError("failed_precondition", f"Create Rig first: no rig is known of {own.name}")
     message["rig"], roots = own[_RIG], own[_HANDS].to_dict()
-    sides = [side for side in roots if settings.hand in (side, "HANDEDNESS_UNSPECIFIED")]
-    if not sides:
+    arms = {
+        side: hands.arm_of(context, own, root)
+        for side, root in roots.items()
+        if settings.hand in (side, "HANDEDNESS_UNSPECIFIED")
+    }
+    if not arms:
         raise GraspError("invalid_argument", f"{own.name} has no {hands.side(settings.hand)} hand")
-    arms = [(side, hands.arm_of(context, own, roots[side])) for side in sides]
-    if client_from_world is None or None in (arm for _, arm in arms):
-        return message | ({"handedness": sides[0]} if len(sides) == 1 else {})
-    # The arm counts for one side: that which is nearer.
-    engine, at = CONVENTIONS[convention], scenes.pose_of(context, context.object.matrix_world)[0]
-    side, (shoulder, upper, forearm) = min(arms, key=lambda one: math.dist(one[1][0], at))
+    if client_from_world is None or None in arms.values():
+        return message | ({"handedness": next(iter(arms))} if len(arms) == 1 else {})
+    # A shoulder is that of one hand: the nearer one.
+    engine, at = CONVENTIONS[convention], scenes.pose_of(context, scenes.frame(context.object))[0]
+    side = min(arms, key=lambda side: math.dist(arms[side][0], at))
+    shoulder, upper, forearm = arms[side]
     client_shoulder = engine.point_from_openxr(composed(client_from_world, (shoulder, IDENTITY[1]))[0])
     lengths = {"upperArmLength": upper * engine.units_per_meter, "forearmLength": forearm * engine.units_per_meter}
     return message | {"handedness": side, "clientShoulder": vector_json(client_shoulder), **lengths}
@@ -152,7 +156,7 @@ def _pose_built_in(context, item, role, hand):
 
 def move(context, item, given):
     """Moves an object to where a giver holds it, in the giver's frame; returns it."""
-    scale = scenes.Matrix.Diagonal((*item.matrix_world.to_scale(), 1.0))
+    scale = scenes.frame(item).inverted() @ item.matrix_world
     item.matrix_world = scenes.matrix(context, given.client_from_object()) @ scale
     context.view_layer.update()
     return item

@@ -299,6 +299,13 @@ def test_a_recording_is_keyed_per_frame(tmp_path):
     receiver, giver = shown("receiver"), shown("giver")
     for owner in (item, receiver, giver):
         assert {len(curve.keyframe_points) for curve in motion.curves(owner)} == {12}
+        turns = {}
+        for curve in motion.curves(owner):
+            if curve.data_path.endswith("rotation_quaternion"):
+                turns.setdefault(curve.data_path, []).append([point.co.y for point in curve.keyframe_points])
+        for path, parts in turns.items():
+            quaternions = list(zip(*parts))
+            assert all(sum(map(float.__mul__, a, b)) > 0 for a, b in zip(quaternions, quaternions[1:])), path
     clear = []
     for index, (seconds, _) in enumerate(recording.frames):
         bpy.context.scene.frame_set(1 + index)
