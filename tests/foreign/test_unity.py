@@ -37,14 +37,15 @@ def stubs():
     if not shutil.which("mcs") or not shutil.which("protoc"):
         pytest.skip("Mono and protoc are not installed")
     WORK.mkdir(parents=True, exist_ok=True)
-    shutil.rmtree(PACKAGE / "Runtime/Generated", ignore_errors=True)
+    generated = WORK / "Generated"
+    shutil.rmtree(generated, ignore_errors=True)
     [commands] = blocks("sh")
+    commands = commands.replace("client/unity/Runtime/Generated", str(generated))
     subprocess.run(["bash", "-e", "-c", commands], cwd=ROOT, check=True, timeout=60)
     sources = [STUBS / name for name in ("Json.cs", "Protobuf.cs", "UnityEngine.cs", "Grpc.cs")]
-    sources += (PACKAGE / "Runtime/Generated").glob("*.cs")
-    # Spares the stubs what mcs cannot compile.
-    yield compiled(WORK / "Stubs.dll", sources, "-define:GOOGLE_PROTOBUF_REFSTRUCT_COMPATIBILITY_MODE", "-nowarn:0612,0414")
-    shutil.rmtree(PACKAGE / "Runtime/Generated")
+    sources += generated.glob("*.cs")
+    # Without what mcs cannot compile.
+    return compiled(WORK / "Stubs.dll", sources, "-define:GOOGLE_PROTOBUF_REFSTRUCT_COMPATIBILITY_MODE", "-nowarn:0612,0414")
 
 
 def runtime():

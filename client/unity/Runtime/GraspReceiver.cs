@@ -53,6 +53,9 @@ namespace GraspClient
         [Tooltip("While tracking: the hand is closing, and is not sent elsewhere any more.")]
         public bool closing;
 
+        [Tooltip("Asks for grasps that can be sent to other players: Grasp.Packed.")]
+        public bool packed;
+
         [Tooltip("How fast the hand goes to the object, in meters per second.")]
         public float speed = 0.8f;
 
@@ -308,7 +311,7 @@ namespace GraspClient
         OutputOptions Output()
         {
             bool flipsX = importer == MeshImporter.FlipsX;
-            return new OutputOptions { Convention = flipsX ? Convention.UnityFlipX : Convention.Unity };
+            return new OutputOptions { Convention = flipsX ? Convention.UnityFlipX : Convention.Unity, Packed = packed };
         }
 
         void Report(GraspException error)

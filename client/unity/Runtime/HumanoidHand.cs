@@ -2,8 +2,8 @@ using UnityEngine;
 
 namespace GraspClient
 {
-    /// <summary>Poses hand, fingers and arm of a Humanoid avatar. Its bones keep their own axes and lengths: each turns from the
-    /// avatar's rest pose (T-pose, fingers stretched) as the joint turns from the stretched hand.</summary>
+    /// <summary>Poses hand, fingers and arm of a Humanoid avatar. Its bones keep their own axes and lengths: fingers point as the
+    /// joints do, whatever the rest pose is.</summary>
     public sealed class HumanoidHand
     {
         readonly Transform upperArm;
@@ -12,10 +12,9 @@ namespace GraspClient
         readonly Transform[] bones = new Transform[HandSkeleton.JointCount];
         readonly Quaternion restHand;
         readonly Quaternion restFrame;
-        readonly Quaternion[] restLocal = new Quaternion[HandSkeleton.JointCount];
-        readonly Quaternion[] restWorld = new Quaternion[HandSkeleton.JointCount];
-        readonly Quaternion[] boneFromJoint = new Quaternion[HandSkeleton.JointCount];
-        Pose[] stretched;
+        readonly Quaternion[] rest = new Quaternion[HandSkeleton.JointCount];
+        readonly Vector3[] restDirection = new Vector3[HandSkeleton.JointCount];
+        readonly Quaternion[] jointFromBone = new Quaternion[HandSkeleton.JointCount];
         Quaternion wristFromHand;
 
         /// <summary>Reads the rest pose: to be made in Awake, while the avatar is in it.</summary>
@@ -34,8 +33,11 @@ namespace GraspClient
                 bones[joint] = animator.GetBoneTransform((HumanBodyBones)(first + i));
                 if (bones[joint] != null)
                 {
-                    restLocal[joint] = bones[joint].localRotation;
-                    restWorld[joint] = bones[joint].rotation;
+                    rest[joint] = bones[joint].rotation;
+                    if (bones[joint].childCount > 0)
+                    {
+                        restDirection[joint] = bones[joint].GetChild(0).position - bones[joint].position;
+                    }
                 }
             }
             restFrame = Frame(hand.position, bones[7].position, bones[12].position, bones[22].position);
@@ -62,14 +64,26 @@ namespace GraspClient
         /// <summary>Lays the stretched hand that answers pose over the avatar's. Required before <see cref="Apply"/>.</summary>
         public void Fit(HandSkeleton skeleton)
         {
-            stretched = skeleton.Stretched();
+            Pose[] stretched = skeleton.Stretched();
             Quaternion frame = Frame(
                 stretched[0].position, stretched[7].position, stretched[12].position, stretched[22].position);
             Quaternion worldFromWrist = restFrame * Quaternion.Inverse(frame);
             wristFromHand = Quaternion.Inverse(worldFromWrist) * restHand;
+            Quaternion straight = Quaternion.identity;
             for (int joint = 0; joint < bones.Length; joint++)
             {
-                boneFromJoint[joint] = Quaternion.Inverse(restWorld[joint]) * worldFromWrist * stretched[joint].rotation;
+                if (bones[joint] == null)
+                {
+                    continue;
+                }
+                // A last bone that nothing follows is as straight as the one before it.
+                if (restDirection[joint] != Vector3.zero)
+                {
+                    Vector3 direction = stretched[joint + 1].position - stretched[joint].position;
+                    straight = Quaternion.FromToRotation(restDirection[joint], worldFromWrist * direction);
+                }
+                jointFromBone[joint] =
+                    Quaternion.Inverse(worldFromWrist * stretched[joint].rotation) * straight * rest[joint];
             }
         }
 
@@ -86,16 +100,9 @@ namespace GraspClient
             {
                 if (bones[joint] != null)
                 {
-                    Quaternion turn = Quaternion.Inverse(Local(stretched, joint)) * Local(joints, joint);
-                    Quaternion axes = boneFromJoint[joint];
-                    bones[joint].localRotation = restLocal[joint] * axes * turn * Quaternion.Inverse(axes);
+                    bones[joint].rotation = joints[joint].rotation * jointFromBone[joint];
                 }
             }
-        }
-
-        static Quaternion Local(Pose[] joints, int joint)
-        {
-            return Quaternion.Inverse(joints[HandSkeleton.Parent(joint)].rotation) * joints[joint].rotation;
         }
 
         /// <summary>The frame of a hand whose fingers point along its z, with its y to one side of the palm.</summary>

@@ -251,7 +251,11 @@ public static class Tests
         }
         for (int i = 0; i < 15; i++)
         {
-            animator.bones[(HumanBodyBones)((isRight ? 39 : 24) + i)] = nodes[HandSkeleton.Base[i / 3] + i % 3];
+            Transform bone = nodes[HandSkeleton.Base[i / 3] + i % 3];
+            animator.bones[(HumanBodyBones)((isRight ? 39 : 24) + i)] = bone;
+            // Bent at rest.
+            Vector3 axis = joints[7].rotation * new Vector3(0.1f, 0, 0);
+            bone.rotation = Quaternion.Normalize(new Quaternion(axis.x, axis.y, axis.z, 1)) * bone.rotation;
         }
         return animator;
     }

@@ -133,7 +133,15 @@ namespace UnityEngine
 
     public class Transform : Component
     {
-        public Transform parent;
+        readonly List<Transform> children = new List<Transform>();
+        Transform above;
+        public Transform parent
+        {
+            get { return above; }
+            set { above = value; if (value != null) { value.children.Add(this); } }
+        }
+        public int childCount { get { return children.Count; } }
+        public Transform GetChild(int index) { return children[index]; }
         public Vector3 localPosition;
         public Quaternion localRotation = Quaternion.identity;
         public Vector3 lossyScale = new Vector3(1, 1, 1);
