@@ -299,6 +299,10 @@ namespace GraspClient
         {
             var receiver = new Receiver { Rig = rig, Handedness = handedness };
             HumanoidHand hand = hands[handedness == Handedness.Right ? 1 : 0];
+            if (hand != null)
+            {
+                receiver.Scale = hand.Scale;
+            }
             if (handedness != Handedness.Unspecified && hand != null)
             {
                 receiver.ClientShoulder = Messages.Write(hand.Shoulder);

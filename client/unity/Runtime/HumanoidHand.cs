@@ -12,6 +12,7 @@ namespace GraspClient
         readonly Transform[] bones = new Transform[HandSkeleton.JointCount];
         readonly Quaternion restHand;
         readonly Quaternion restFrame;
+        readonly float restLength;
         readonly Quaternion[] rest = new Quaternion[HandSkeleton.JointCount];
         readonly Vector3[] restDirection = new Vector3[HandSkeleton.JointCount];
         readonly Quaternion[] jointFromBone = new Quaternion[HandSkeleton.JointCount];
@@ -41,7 +42,12 @@ namespace GraspClient
                 }
             }
             restFrame = Frame(hand.position, bones[7].position, bones[12].position, bones[22].position);
+            restLength = (bones[12].position - hand.position).magnitude;
+            Scale = 1;
         }
+
+        /// <summary>The avatar's hand over the rig's, in hundredths: Receiver.scale. Known after <see cref="Fit"/>.</summary>
+        public float Scale { get; private set; }
 
         /// <summary>The shoulder, in Unity's world.</summary>
         public Vector3 Shoulder
@@ -69,6 +75,8 @@ namespace GraspClient
                 stretched[0].position, stretched[7].position, stretched[12].position, stretched[22].position);
             Quaternion worldFromWrist = restFrame * Quaternion.Inverse(frame);
             wristFromHand = Quaternion.Inverse(worldFromWrist) * restHand;
+            float ratio = restLength / (stretched[12].position - stretched[0].position).magnitude;
+            Scale = Mathf.Clamp(Mathf.Round(ratio * 100) / 100, 0.5f, 2);
             Quaternion straight = Quaternion.identity;
             for (int joint = 0; joint < bones.Length; joint++)
             {

@@ -269,6 +269,7 @@ public static class Tests
             Animator animator = Avatar(pair.IsRight, skeleton, i);
             var hand = new HumanoidHand(animator, pair.IsRight);
             hand.Fit(skeleton);
+            Check(hand.Scale == 1, pair.Name + ": the hand has size " + hand.Scale);
             // Where the arm reaches it.
             Vector3 near = hand.Shoulder + new Vector3(0.1f, -0.2f, 0.3f);
             Pose[] joints = Joints(pair);

@@ -110,6 +110,7 @@ namespace UnityEngine
         public static float Sin(float x) { return (float)Math.Sin(x); }
         public static float Cos(float x) { return (float)Math.Cos(x); }
         public static float Pow(float x, float y) { return (float)Math.Pow(x, y); }
+        public static float Round(float x) { return (float)Math.Round(x); }
         public static float Max(float a, float b) { return Math.Max(a, b); }
         public static float Clamp(float x, float min, float max) { return Math.Max(min, Math.Min(max, x)); }
         public static float Clamp01(float x) { return Clamp(x, 0, 1); }

@@ -47,7 +47,7 @@ struct FScene
 		Component.Animated = &Animated;
 		Body(Golden, Vector);
 		Component.BeginPlay();
-		Frame();
+		Frames(3 * FrameTime);
 		Check(Failures.empty(), "the rig is not there");
 	}
 
@@ -131,6 +131,7 @@ void TheFirstCallOfTheReadmeFindsAGrasp(const FGolden&, const char* Address)
 	std::string Found;
 	Taker.Grasp->OnGrasp.Handlers.push_back([&Found](bool, const FString& Type, float) { Found = Type.S; });
 	Taker.BeginPlay();
+	Taker.Grasp->TickComponent(FrameTime, LEVELTICK_All, nullptr);
 	Http::Deliver();
 	Check(Found.find("GRASP_TYPE_") == 0, "it found " + Found);
 }

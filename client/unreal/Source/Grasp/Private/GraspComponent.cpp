@@ -69,9 +69,9 @@ UGraspComponent::UGraspComponent()
 void UGraspComponent::BeginPlay()
 {
 	Super::BeginPlay();
-	if (Posed)
+	for (int32 Each = 0; Posed && Each < 2; Each++)
 	{
-		GetRig();
+		ReadArm(Each, Hands[Each].Rest);
 	}
 }
 
@@ -84,6 +84,12 @@ void UGraspComponent::EndPlay(const EEndPlayReason::Type Reason)
 void UGraspComponent::Ask()
 {
 	Stop();
+	bAsking = true;
+}
+
+void UGraspComponent::FindGrasp()
+{
+	bAsking = false;
 	TSharedRef<FJsonObject> Request = MakeShared<FJsonObject>();
 	TSharedRef<FJsonObject> Form = Output();
 	Form->SetBoolField(TEXT("keyFrames"), true);
@@ -113,8 +119,10 @@ void UGraspComponent::Stop()
 		Call(TEXT("GraspService/DeleteTrack"), Request, [](const FJsonObject&) {});
 	}
 	Run++;
+	bAsking = false;
 	bTracking = false;
 	bWaiting = false;
+	NextTry = Now;
 	TrackName = FString();
 	if (Player.IsSet())
 	{
@@ -168,9 +176,20 @@ void UGraspComponent::TickComponent(float Seconds, ELevelTick Kind, FActorCompon
 {
 	Super::TickComponent(Seconds, Kind, Function);
 	Now += Seconds;
-	if (bTracking && !bWaiting && Now >= NextTry)
+	if (!bWaiting && Now >= NextTry)
 	{
-		PushFrame();
+		if (Posed && !Hands[0].Skeleton.IsSet())
+		{
+			GetRig();
+		}
+		else if (bAsking)
+		{
+			FindGrasp();
+		}
+		else if (bTracking)
+		{
+			PushFrame();
+		}
 	}
 	if (Posed && Animated)
 	{
@@ -202,6 +221,7 @@ void UGraspComponent::Call(const TCHAR* Method, const TSharedRef<FJsonObject>& R
 	Http->SetHeader(TEXT("Connect-Timeout-Ms"), FString::Printf(TEXT("%d"), static_cast<int32>(Deadline * 1000)));
 	Http->SetTimeout(Deadline + 1);
 	Http->SetContentAsString(Body);
+	bWaiting = true;
 	const int32 Mine = Run;
 	Http->OnProcessRequestComplete().BindWeakLambda(
 		this, [this, Mine, Answered = MoveTemp(Answered)](FHttpRequestPtr, FHttpResponsePtr Response, bool bConnected) {
@@ -256,10 +276,6 @@ void UGraspComponent::GetRig()
 {
 	TSharedRef<FJsonObject> Request = MakeShared<FJsonObject>();
 	Request->SetStringField(TEXT("name"), Rig);
-	for (int32 Each = 0; Each < 2; Each++)
-	{
-		ReadArm(Each, Hands[Each].Rest);
-	}
 	Call(TEXT("HandRigService/GetRig"), Request, [this](const FJsonObject& Answer) { ReadRig(Answer); });
 }
 
@@ -295,7 +311,6 @@ void UGraspComponent::ReadRig(const FJsonObject& Answer)
 
 void UGraspComponent::PushFrame()
 {
-	bWaiting = true;
 	TSharedRef<FJsonObject> Request = MakeShared<FJsonObject>();
 	if (TrackName.IsEmpty())
 	{
@@ -456,11 +471,16 @@ TSharedRef<FJsonObject> UGraspComponent::Receiver() const
 {
 	TSharedRef<FJsonObject> Out = MakeShared<FJsonObject>();
 	Out->SetStringField(TEXT("rig"), Rig);
+	const bool bRight = Hand == EGraspHand::Right;
+	const TOptional<grasp::ArmPoser>& Poser = Hands[bRight ? 1 : 0].Poser;
+	if (Poser.IsSet())
+	{
+		Out->SetNumberField(TEXT("scale"), Poser.GetValue().Scale());
+	}
 	if (Hand == EGraspHand::Either)
 	{
 		return Out;
 	}
-	const bool bRight = Hand == EGraspHand::Right;
 	Out->SetStringField(TEXT("handedness"), bRight ? TEXT("HANDEDNESS_RIGHT") : TEXT("HANDEDNESS_LEFT"));
 	grasp::Arm Arm;
 	if (Posed && ReadArm(bRight ? 1 : 0, Arm))

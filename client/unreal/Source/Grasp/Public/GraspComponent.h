@@ -104,7 +104,7 @@ public:
 	UPROPERTY(BlueprintAssignable, Category = "Grasp")
 	FGraspFailed OnFailed;
 
-	/** Asks once, and plays the motion to the grasp. */
+	/** Asks once, at the next tick, and plays the motion to the grasp. */
 	UFUNCTION(BlueprintCallable, Category = "Grasp")
 	void Ask();
 
@@ -156,6 +156,7 @@ private:
 	void Fail(const FString& Code, const FString& Message, const TArray<FString>& Violations);
 	void GetRig();
 	void ReadRig(const FJsonObject& Answer);
+	void FindGrasp();
 	void PushFrame();
 	void Tracked(const FJsonObject& Answer, const grasp::Pose& WorldFromObject);
 	void Show(const FJsonObject* Grasp, const FJsonObject* Hand, const grasp::Pose& WorldFromObject);
@@ -174,6 +175,7 @@ private:
 
 	/** Answers of calls that were made before the last Stop are dropped. */
 	int32 Run = 0;
+	bool bAsking = false;
 	bool bTracking = false;
 	bool bWaiting = false;
 	FString TrackName;

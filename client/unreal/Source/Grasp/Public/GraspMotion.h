@@ -111,6 +111,9 @@ public:
 		const Quaternion Theirs = Frame(
 			Stretched[Wrist].Position, Stretched[7].Position, Stretched[12].Position, Stretched[22].Position);
 		const Quaternion RestFromWrist = Mine * Inverse(Theirs);
+		const double Ratio = Length(Rest.Fingers[6]->Position - Rest.Hand.Position)
+			/ Length(Stretched[12].Position - Stretched[Wrist].Position);
+		HandScale = std::min(std::max(std::round(Ratio * 100) / 100, 0.5), 2.0);
 		HandAtJoint = Inverse(RestFromWrist) * Rest.Hand.Orientation;
 		Quaternion Straight;
 		for (int Bone = 0; Bone < FingerBones; Bone++)
@@ -131,6 +134,9 @@ public:
 				Inverse(RestFromWrist * Stretched[Joint].Orientation) * Straight * Rest.Fingers[Bone]->Orientation;
 		}
 	}
+
+	/** The skeleton's hand over the rig's, in hundredths: Receiver.scale. */
+	double Scale() const { return HandScale; }
 
 	/** Turns that bring the hand to the joints, as far as the arm reaches.
 	 *  Now: the arm as it is, in the joints' frame. Elbow: where it should be, Grasp.arm; unset: it stays in its plane. */
@@ -195,6 +201,7 @@ private:
 		Turns.Forearm = FromTo(HandNow, Shoulder + Along * Distance - Bend) * First * Now.Forearm.Orientation;
 	}
 
+	double HandScale;
 	/** Orientations of bones in the frames of their joints. */
 	Quaternion HandAtJoint;
 	std::array<Quaternion, FingerBones> FingerAtJoint;
