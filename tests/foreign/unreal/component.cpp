@@ -34,7 +34,7 @@ struct FScene
 	FScene(const FGolden& Golden, const FGolden::FVector& Vector, const char* Address)
 	{
 		Component.Address = Address;
-		Component.Object = Vector.Request.holdout().object().c_str();
+		Component.ObjectName = Vector.Request.holdout().object().c_str();
 		Component.Importer = EGraspImporter::GltfRuntime;
 		Component.HeldObject = &Object;
 		Component.Hand = Vector.IsRight() ? EGraspHand::Right : EGraspHand::Left;

@@ -449,7 +449,7 @@ void UGraspComponent::PoseBones(const grasp::Joints& WorldJoints)
 TSharedRef<FJsonObject> UGraspComponent::Holdout(bool bWithPoses) const
 {
 	TSharedRef<FJsonObject> Out = MakeShared<FJsonObject>();
-	Out->SetStringField(TEXT("object"), Object);
+	Out->SetStringField(TEXT("object"), ObjectName);
 	if (bWithPoses)
 	{
 		Out->SetObjectField(TEXT("clientFromObject"), GraspJson::Write(ObjectPose()));

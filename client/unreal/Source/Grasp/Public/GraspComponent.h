@@ -50,7 +50,7 @@ public:
 
 	/** The object's name on the server. */
 	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Grasp")
-	FString Object = TEXT("objects/scissors");
+	FString ObjectName = TEXT("objects/scissors");
 
 	/** The object in the level, with the mesh that was imported from the same file. Its scale is sent. */
 	UPROPERTY(BlueprintReadWrite, Category = "Grasp")
