@@ -1,5 +1,5 @@
-"""Compiles the Unreal plugin against what it uses of Unreal (tests/foreign/unreal/Unreal.h), and runs it: its headers on the golden
-grasps and in a client by libgrpc++, its component against a server. The code of the contract is compiled once."""
+"""Compiles the Unreal plugin with the part of Unreal that it uses (tests/foreign/unreal/Unreal.h), and runs it: its headers on the
+golden grasps and in a client by libgrpc++, its component against a server. The code of the contract is compiled once."""
 
 import hashlib
 import json

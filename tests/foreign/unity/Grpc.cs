@@ -1,4 +1,4 @@
-// What GrpcTransport uses of Grpc.Core.Api, Grpc.Net.Client and YetAnotherHttpHandler. It only compiles.
+// The part of Grpc.Core.Api, Grpc.Net.Client and YetAnotherHttpHandler that GrpcTransport uses. It only compiles.
 using System;
 using System.Net.Http;
 using System.Threading;

@@ -1,4 +1,4 @@
-// What generated code and the package use of Google.Protobuf. JSON and the reading of bytes work; writing bytes does not.
+// The part of Google.Protobuf that generated code and the package use. JSON and the reading of bytes work; writing bytes does not.
 using System;
 using System.Collections;
 using System.Collections.Generic;
@@ -346,8 +346,8 @@ namespace Google.Protobuf.Reflection
     public sealed class GeneratedClrTypeInfo
     {
         public GeneratedClrTypeInfo(Type[] enums, Extension[] extensions, GeneratedClrTypeInfo[] messages) { }
-        public GeneratedClrTypeInfo(Type type, MessageParser<object> parser, string[] a, string[] b, Type[] c, Extension[] d, GeneratedClrTypeInfo[] e) { }
-        public GeneratedClrTypeInfo(Type type, object parser, string[] a, string[] b, Type[] c, Extension[] d, GeneratedClrTypeInfo[] e) { }
+        public GeneratedClrTypeInfo(
+            Type type, object parser, string[] a, string[] b, Type[] c, Extension[] d, GeneratedClrTypeInfo[] e) { }
     }
 
     public static class DescriptorReflection { public static FileDescriptor Descriptor { get { return null; } } }

@@ -34,7 +34,7 @@ public static class Tests
         public bool IsRight { get { return Unity.Hand.Handedness == Handedness.Right; } }
     }
 
-    /// <summary>Runs what is posted on this thread, as Unity's main thread does once a frame.</summary>
+    /// <summary>Runs posted callbacks on this thread, as Unity's main thread does once a frame.</summary>
     sealed class Loop : SynchronizationContext
     {
         readonly ConcurrentQueue<Action> posted = new ConcurrentQueue<Action>();

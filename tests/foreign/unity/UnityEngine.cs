@@ -1,4 +1,4 @@
-// What the package uses of UnityEngine: the mathematics and the hierarchy of transforms work, in Unity's axes.
+// The part of UnityEngine that the package uses: the mathematics and the hierarchy of transforms work, in Unity's axes.
 using System;
 using System.Collections.Generic;
 using System.Threading;

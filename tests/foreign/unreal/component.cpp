@@ -1,4 +1,4 @@
-// Runs the plugin's component in what it uses of Unreal: component GOLDEN_FILE http://HOST:PORT.
+// Runs the plugin's component with the part of Unreal that it uses: component GOLDEN_FILE http://HOST:PORT.
 
 #include "golden.h"
 

@@ -80,7 +80,7 @@ public:
 	UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Grasp")
 	float Speed = 80;
 
-	/** What is posed and seen: a poseable mesh with the character's mesh. Unset: only GetJoints tells of the grasp. */
+	/** The mesh that is posed and seen: a poseable one with the character's mesh. Unset: only GetJoints tells of the grasp. */
 	UPROPERTY(BlueprintReadWrite, Category = "Grasp")
 	UPoseableMeshComponent* Posed = nullptr;
 
@@ -144,7 +144,7 @@ public:
 private:
 	using FAnswered = TFunction<void(const FJsonObject&)>;
 
-	/** One hand of the character: the skeleton that answers pose, and what brings the character's bones there. */
+	/** One hand of the character: its bones at rest, the skeleton that answers pose, and the way from one to the other. */
 	struct FHand
 	{
 		grasp::Arm Rest;
