@@ -120,7 +120,10 @@ namespace GraspClient
         void OnDisable()
         {
             running.Cancel();
-            Show(null, null);
+            if (player != null)
+            {
+                Show(null, null);
+            }
         }
 
         void LateUpdate()
@@ -212,7 +215,10 @@ namespace GraspClient
                     Show(answer.Grasp, asked);
                     break;
                 case CurrentGraspStatus.None:
-                    Show(null, asked);
+                    if (player != null)
+                    {
+                        Show(null, asked);
+                    }
                     break;
                 case CurrentGraspStatus.Aborted:
                     Show(new Grasp.V1.Grasp { Hand = answer.Current.Withdrawal }, asked);
