@@ -2,6 +2,8 @@
 
 mod answers;
 pub mod codec;
+#[cfg(feature = "json")]
+pub mod json;
 mod packed;
 mod requests;
 mod values;
