@@ -152,6 +152,8 @@ LINKED = [
     "proto/LIMITS.md",
     "proto/PACKED.md",
     "client/README.md",
+    "client/RECIPES.md",
+    "client/bevy/README.md",
     "server/README.md",
     "server/HANDS.md",
     "docker/README.md",

@@ -6,6 +6,7 @@ mod evaluate;
 mod failure;
 mod find;
 mod input;
+mod isaac;
 mod objects;
 mod output;
 mod rigs;

@@ -22,6 +22,7 @@ use crate::{
         Choice, HANDS, HoldoutOptions, MESH_LIMITS, STRATEGIES, full_name, one_of, parse_duration,
         parse_view_size, read_file, read_message,
     },
+    isaac::{self, NamedGrasp},
     output::{
         grasp_type_name, human_time, joined, name_of, write_file, write_line, write_message,
         write_message_line,
@@ -154,6 +155,9 @@ pub(crate) struct Arguments {
     /// Write the scene as a binary glTF file, if a grasp is found.
     #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
     glb: Option<PathBuf>,
+    /// Write the grasps to a file in the format isaac_grasp 1.0, if one is found; see `grasp objects grips export --help`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["print_request", "stream"])]
+    isaac: Option<PathBuf>,
     /// The file that the receiving hand's rig was created from, to draw the hand with its own skin.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -181,8 +185,11 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         return Ok(Ending::Done);
     }
     let client = arguments.server.connect().await?;
-    // Before the search: reports a scene that cannot be drawn.
+    // Before the search: reports a scene that cannot be drawn, and axes that a file does not have.
     let drawing = arguments.drawing(&client, &request).await?;
+    if arguments.isaac.is_some() {
+        require_openxr(&request, "files in the format isaac_grasp require")?;
+    }
     if let Some(sent) = arguments.sent() {
         let request = v1::StreamGraspsRequest {
             sent: Some(sent),
@@ -199,6 +206,9 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     {
         arguments.draw(&drawing, &answer.grasps, None).await?;
     }
+    arguments
+        .write_isaac(&client, &request.holdout, &answer.grasps)
+        .await?;
     output.write_message(&answer, |answer| {
         answer::describe(&request, answer, round_trip_seconds)
     })?;
@@ -221,6 +231,9 @@ impl Arguments {
         without_default(&mut request.receiver);
         without_default(&mut request.requirements);
         without_default(&mut request.search);
+        if self.isaac.is_some() {
+            request = request.with_key_frames();
+        }
         if let Some(path) = self.current.clone() {
             let answer: v1::FindGraspResponse = blocking(move || read_message("current", &path)).await?;
             let without = || Failure::usage("current: the answer has no grasp");
@@ -246,12 +259,7 @@ impl Arguments {
         if self.png.is_none() && self.glb.is_none() {
             return Ok(None);
         }
-        let convention = request.output.as_ref().map(v1::OutputOptions::convention);
-        let convention = convention.unwrap_or_default();
-        if !matches!(convention, Convention::Unspecified | Convention::Openxr) {
-            let why = "pictures require a request in the openxr convention";
-            return Err(Failure::usage(why));
-        }
+        require_openxr(request, "pictures require")?;
         let holdout = request.holdout.clone().unwrap_or_default();
         let model = self.model.as_deref().map(read_file).transpose()?;
         Ok(Some(Handover {
@@ -283,6 +291,27 @@ impl Arguments {
         .await
     }
 
+    /// Writes the grasps to the file of `--isaac`.
+    async fn write_isaac(
+        &self,
+        client: &GraspClient,
+        holdout: &Option<v1::Holdout>,
+        grasps: &[v1::Grasp],
+    ) -> Result<(), Failure> {
+        let (Some(path), Some(holdout)) = (&self.isaac, holdout) else {
+            return Ok(());
+        };
+        if grasps.is_empty() {
+            return Ok(());
+        }
+        let object = client.get_object(&holdout.object).await?;
+        let named = grasps.iter().enumerate();
+        let named: Vec<_> = named
+            .map(|(number, grasp)| NamedGrasp::found(format!("grasp_{number}"), grasp))
+            .collect();
+        isaac::write(path, &object, &named)
+    }
+
     async fn show_stream(
         &self,
         client: &GraspClient,
@@ -294,11 +323,12 @@ impl Arguments {
         if !output.json {
             write_line(&line(HEADER))?;
         }
-        let mut count = 0;
+        let mut grasps = Vec::new();
         let mut end = Ending::NoGrasp;
         while let Some(message) = stream.next().await? {
             let grasp = message.grasp();
-            count += usize::from(grasp.is_some());
+            grasps.extend(grasp.cloned());
+            let count = grasps.len();
             if output.json {
                 write_message_line(&message)?;
             } else {
@@ -311,6 +341,7 @@ impl Arguments {
                 (None, _) => end = Ending::found(message.outcome() == Outcome::Found),
             }
         }
+        self.write_isaac(client, &request.holdout, &grasps).await?;
         Ok(end)
     }
 
@@ -328,6 +359,17 @@ impl Arguments {
         search.seed = self.seed.or(search.seed);
         search.replay_attempt = self.replay_attempt.or(search.replay_attempt);
         search.ignore_atlas |= self.ignore_atlas;
+    }
+}
+
+/// Refuses a request in the axes of an engine; `what` needs others.
+fn require_openxr(request: &v1::FindGraspRequest, what: &str) -> Result<(), Failure> {
+    let convention = request.output.as_ref().map(v1::OutputOptions::convention);
+    match convention.unwrap_or_default() {
+        Convention::Unspecified | Convention::Openxr => Ok(()),
+        _ => Err(Failure::usage(format!(
+            "{what} a request in the openxr convention"
+        ))),
     }
 }
 

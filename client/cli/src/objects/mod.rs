@@ -1,6 +1,7 @@
 //! `grasp objects`
 
 mod describe;
+mod grips;
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +26,7 @@ use crate::{
 };
 use describe::{KNOWN_GRIPS, REGIONS, atlas_state, friction, labels, show, size};
 
-/// List, show, create, change, delete and watch objects, save their meshes, and show their atlases.
+/// List, show, create, change, delete and watch objects, save their meshes, show their atlases, and exchange their grips.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -76,6 +77,9 @@ enum Command {
         /// The object's name: "remote" or "objects/remote".
         name: String,
     },
+    /// Export an object's preferred grips to a file in the format isaac_grasp 1.0, or import them.
+    #[command(subcommand)]
+    Grips(grips::Command),
 }
 
 pub(crate) async fn run(Arguments { command, server }: Arguments, output: Output) -> Result<(), Failure> {
@@ -95,6 +99,7 @@ pub(crate) async fn run(Arguments { command, server }: Arguments, output: Output
         }
         Command::Watch(arguments) => watch(&server.connect().await?, arguments, output).await,
         Command::Mesh { out, name } => mesh(&server.connect().await?, &out, &name, output).await,
+        Command::Grips(command) => grips::run(&server.connect().await?, command, output).await,
         Command::Atlas { name } => atlases(&server.connect().await?, &name, output).await,
     }
 }

@@ -6,7 +6,7 @@ use grasp_server::{Config, config::StorePlace};
 use serde_json::{Value, json};
 use tokio::{sync::oneshot, task::JoinHandle};
 
-use crate::harness::{Call, assert_has, empty_folder, file, grasp, real_server, serve};
+use crate::harness::{Call, assert_contains, assert_has, empty_folder, file, grasp, real_server, serve};
 
 /// A box of 4, 3 and 2 cm with a lid.
 const BOX_OBJ: &str = "\
@@ -90,6 +90,59 @@ async fn a_saved_mesh_can_be_created_again() {
         .arg(copy)
         .json();
     assert_eq!(created["triangleCount"], saved["object"]["triangleCount"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn grips_are_exchanged_with_isaac_sim() {
+    let url = real_server().await;
+    let folder = empty_folder("grips_for_isaac");
+    let [mesh, found, exported] = ["mesh.glb", "found.yaml", "exported.yaml"].map(|name| folder.join(name));
+    let grips = |command: &str, file: &Path| objects(&url, "grips").with(command).with("--isaac").arg(file);
+    objects(&url, "mesh remote").with("--out").arg(&mesh).text();
+    let create = objects(&url, "create mine --mass 0.1");
+    create.with("--mesh").arg(&mesh).text();
+    let find = grasp("find --request - --receiving-hand right").at(&url);
+    let request = json!({"holdout": {"object": "objects/mine"}}).to_string();
+    let answer = find.with("--isaac").arg(&found).input(request).json();
+
+    // The grasp that was found becomes a known grip, which is exported as it was found.
+    let imported = grips("import mine", &found).json();
+    let (grip, hand) = (&imported["knownGrips"][0], &answer["grasps"][0]["hand"]);
+    assert_has(
+        grip,
+        &json!({"name": "grasp_0", "preference": "PREFERENCE_PREFERRED"}),
+    );
+    for part in ["rig", "handedness", "objectFromWrist", "thumb", "little"] {
+        assert_eq!(grip["hand"][part], hand[part], "{part}");
+    }
+    let export = grips("export mine", &exported);
+    let written = export.json();
+    let confidence = written["grips"][0]["confidence"].as_f64().unwrap();
+    assert!(confidence > 0.3 && written["left_out"] == json!([]), "{written}");
+    let text = fs::read_to_string(&exported).unwrap();
+    assert_contains(
+        &text,
+        &[
+            "pregrasp_cspace_position:\n      thumb_base_yaw: ",
+            "rigs/adult/right",
+        ],
+    );
+    let again = grips("import mine", &exported).json();
+    assert_eq!(again["knownGrips"], imported["knownGrips"]);
+
+    let panda = text
+        .replace("rigs/adult/right", "/World/panda_hand")
+        .replace("thumb_base_yaw", "panda_finger_joint1");
+    let import = grips("import mine", &file(&folder, "panda.yaml", panda));
+    import.complains(2, "--gripper");
+    let left = "--gripper rigs/adult/left";
+    import
+        .with(left)
+        .complains(2, "grasp_0: a hand has no joints panda_finger_joint1");
+    export
+        .with(left)
+        .complains(2, "no preferred grips of rigs/adult/left");
+    grips("import remote", &exported).ends_with(4);
 }
 
 /// A server without atlases that saves objects in a folder.
