@@ -25,7 +25,7 @@
 //!
 //! ```text
 //! budget  convention  error  health_check  middleware  wire
-//! limits
+//! limits  viewer
 //! atlas_slots  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
@@ -62,6 +62,7 @@ mod serve;
 mod services;
 mod track;
 mod validate;
+mod viewer;
 mod web;
 mod wire;
 

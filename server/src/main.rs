@@ -147,6 +147,9 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
         select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
     };
     tracing::info!(address = %listener.local_addr()?, workers = config.workers, "serving");
+    if config.viewer {
+        tracing::info!("the viewer is at http://{}/", listener.local_addr()?);
+    }
     server.serve(listener, shutdown).await?;
     Ok(())
 }

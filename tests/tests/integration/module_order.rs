@@ -19,7 +19,7 @@ const SERVER: &[&[&str]] = &[
         "middleware",
         "wire",
     ],
-    &["limits"],
+    &["limits", "viewer"],
     &["atlas_slots", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],
