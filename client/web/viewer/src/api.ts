@@ -10,7 +10,7 @@ import {
   type StreamGraspsRequestSchema,
 } from "#contract/grasp_service_pb";
 import { HandRigService } from "#contract/hand_rig_service_pb";
-import { type GraspObject, ObjectService } from "#contract/object_service_pb";
+import { type GraspObject, ObjectService, ObjectView } from "#contract/object_service_pb";
 import { TrackSchema, type Track } from "#contract/track_pb";
 
 const transport = createGrpcWebTransport({ baseUrl: location.origin });
@@ -49,7 +49,7 @@ export async function allObjects(): Promise<GraspObject[]> {
   const all: GraspObject[] = [];
   let pageToken = "";
   do {
-    const page = await objects.listObjects({ pageToken, pageSize: 100 });
+    const page = await objects.listObjects({ pageToken, pageSize: 100, view: ObjectView.FULL });
     all.push(...page.objects);
     pageToken = page.nextPageToken;
   } while (pageToken !== "");

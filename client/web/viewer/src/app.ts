@@ -183,7 +183,8 @@ export class App {
     this.shownObject = object;
     this.isMeshShown = false;
     try {
-      const mesh = await meshOf(object, this.object?.etag ?? "");
+      const { etag } = this.object ?? (await api.objects.getObject({ name: object }));
+      const mesh = await meshOf(object, etag);
       if (this.state.object !== object) return;
       this.view.showObject(mesh);
       this.isMeshShown = true;

@@ -2,7 +2,7 @@
 import type { GraspObject } from "#contract/object_service_pb";
 import type { App } from "./app";
 import * as api from "./api";
-import { button, byId, dialog, element, toast } from "./dom";
+import { button, byId, dialog, element, select, toast } from "./dom";
 import { handedness, type Side } from "./kinematics";
 import { stateFor } from "./state";
 import { objectName } from "./words";
@@ -18,6 +18,9 @@ export function freeName(file: string, taken: string[]): string {
     if (!taken.includes(name)) return name;
   }
 }
+
+/** Units of files, by meters per unit. */
+const UNITS: [string, string][] = [["1", "meters"], ["0.01", "centimeters"], ["0.001", "millimeters"], ["0.0254", "inches"]];
 
 /** Hand and character files name bones of hands in their nodes. */
 function looksLikeHand(file: string, bytes: Uint8Array): boolean {
@@ -75,7 +78,7 @@ export class Files {
   private askObject(file: string, mesh: Uint8Array<ArrayBuffer>): void {
     const name = element("input", { type: "text", id: "new-name", value: freeName(file, this.app.objects.map((object) => objectName(object.name))) });
     const mass = element("input", { type: "number", id: "new-mass", min: "0.001", step: "0.01", value: "0.2" });
-    const unit = element("select", { id: "new-unit" }, ...[["1", "meters"], ["0.01", "centimeters"], ["0.001", "millimeters"], ["0.0254", "inches"]].map(([value, text]) => element("option", { value }, text!)));
+    const unit = select(UNITS, "1", () => undefined, { id: "new-unit" });
     const zUp = element("input", { type: "checkbox", id: "new-z-up" });
     const problem = element("p", { class: "dim", id: "new-problem" });
     dialog("New object", (close) => [
@@ -106,7 +109,27 @@ export class Files {
   private async created(object: GraspObject): Promise<void> {
     await this.app.refreshObjects();
     this.app.open(stateFor(object.name));
-    report(object);
+    this.report(object);
+  }
+
+  /** What is odd about an object; a wrong unit can be changed. */
+  private report(object: GraspObject): void {
+    const size = object.boundingBox?.halfExtents;
+    const edges = size ? [size.x, size.y, size.z].map((half) => `${(200 * half).toPrecision(3)}`).join(" × ") : "?";
+    const unit = String(UNITS.map(([value]) => Number(value)).find((value) => Math.abs(value / (object.metersPerUnit ?? 1) - 1) < 1e-5) ?? 1);
+    const change = (metersPerUnit: string) => {
+      const { name, etag } = object;
+      const changed = { object: { name, etag, metersPerUnit: Number(metersPerUnit) }, updateMask: { paths: ["meters_per_unit"] } };
+      api.objects.updateObject(changed).then((updated) => this.created(updated), (error: unknown) => toast(api.inWords(error), "bad"));
+    };
+    dialog(objectName(object.name), (close) => [
+      element("p", {}, `${object.triangleCount} triangles, ${edges} cm, ${object.massKg.toPrecision(3)} kg`),
+      object.warnings.length > 0
+        ? element("ul", { class: "warnings", id: "object-warnings" }, ...object.warnings.map((line) => element("li", {}, line)))
+        : element("p", { class: "dim" }, "Nothing is odd about this mesh."),
+      element("div", { class: "fields" }, "Unit of the file", select(UNITS, unit, change, { id: "unit" })),
+      element("div", { class: "row" }, button("Close", close, { id: "close" })),
+    ]);
   }
 
   private askHand(file: string, model: Uint8Array<ArrayBuffer>): void {
@@ -140,17 +163,4 @@ export class Files {
       ),
     ]);
   }
-}
-
-/** What is odd about an object. */
-export function report(object: GraspObject): void {
-  const size = object.boundingBox?.halfExtents;
-  const edges = size ? [size.x, size.y, size.z].map((half) => `${(200 * half).toFixed(1)}`).join(" × ") : "?";
-  dialog(objectName(object.name), (close) => [
-    element("p", {}, `${object.triangleCount} triangles, ${edges} cm, ${object.massKg.toPrecision(3)} kg`),
-    object.warnings.length > 0
-      ? element("ul", { class: "warnings", id: "object-warnings" }, ...object.warnings.map((line) => element("li", {}, line)))
-      : element("p", { class: "dim" }, "Nothing is odd about this mesh."),
-    element("div", { class: "row" }, button("Close", close, { id: "close" })),
-  ]);
 }
