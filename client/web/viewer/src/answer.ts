@@ -1,6 +1,6 @@
 /** The panel with the answer: the grasp, how long it took, and why it changed. */
 import { type CurrentGraspReport, CurrentGraspStatus, type Grasp, type GraspOrigin, Outcome, type SearchReport } from "#contract/grasp_pb";
-import { element } from "./dom";
+import { button, element } from "./dom";
 import { vector } from "./poses";
 import { checkName, digitName, handName, milliseconds, outcomeName, sourceName, statusName, typeName, valueOf } from "./words";
 
@@ -43,14 +43,15 @@ function reasons({ current, report, grasp }: Answer): string[] {
   return all;
 }
 
-export function answerPanel(answer: Answer): HTMLElement[] {
+/** `again` searches anew. */
+export function answerPanel(answer: Answer, again: () => void): HTMLElement[] {
   const { grasp, report, origin } = answer;
   const [outcome, kind] = outcomeOf(answer);
   const lines = reasons(answer);
   const head = element(
     "section",
     { id: "answer" },
-    element("h2", {}, "Grasp", element("span", { class: `pill ${kind}`, id: "outcome" }, outcome)),
+    element("h2", {}, "Grasp", button("Search again", again, { class: "small", id: "again" }), element("span", { class: `pill ${kind}`, id: "outcome" }, outcome)),
     element(
       "div",
       { class: "headline" },

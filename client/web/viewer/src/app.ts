@@ -1,8 +1,10 @@
 /** The page's parts and how they work together: a change of the state asks the server, its answer goes to stage and panels. */
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { Line3, Vector3 } from "three";
+
 import { Outcome, type Grasp } from "#contract/grasp_pb";
 import type { FindGraspRequestSchema } from "#contract/grasp_service_pb";
 import type { GraspObject } from "#contract/object_service_pb";
-import type { MessageInitShape } from "@bufbuild/protobuf";
 import type { Answer } from "./answer";
 import * as api from "./api";
 import { toast } from "./dom";
@@ -15,10 +17,13 @@ import type { Rigs } from "./rigs";
 import type { Stage } from "./stage";
 import { type Change, findRequest, fromHash, type Giver, type State, stateFor, Store, toHash, wireHoldout, wireReceiver } from "./state";
 import { View } from "./view";
-import { Vector3 } from "three";
 
-/** Where the camera stands at first, seen from the object; on the other side if the receiver's arm is there. */
-const FROM = new Vector3(0.8, 0.56, 0.24);
+/** Where the camera may stand at first, seen from the object; the first place from which no body is in the way is taken. */
+const FROM = [new Vector3(0.8, 0.56, 0.24), new Vector3(0.8, 0.56, -0.3), new Vector3(0.7, 1.1, 0)];
+
+/** Distance of the camera, and the radius of a body, in meters. */
+const VIEW = 0.7;
+const BODY = 0.26;
 
 export class App {
   readonly rigs: Rigs;
@@ -102,6 +107,8 @@ export class App {
     this.answer = null;
     this.view.settle(state);
     this.isNew = true;
+    // Shown anew even if it is the same object: its size may be another.
+    this.shownObject = "";
     this.store.set(state, "find");
     this.gizmos.select(null);
   }
@@ -198,9 +205,21 @@ export class App {
   /** Shows object and hands, or the people, from where the camera is or from the side that nobody's arm hides. */
   frame(what: "hands" | "people", fromSide = false): void {
     const { center, radius } = this.view.bounds(what);
-    const elbow = this.view.people.receiver.elbow;
-    const side = elbow && elbow.x > this.state.pose.p[0] ? -1 : 1;
-    this.stage.frame(center, radius, fromSide ? FROM.clone().multiply(new Vector3(side, 1, 1)) : undefined);
+    this.stage.frame(center, radius, fromSide ? this.freeSide(center) : undefined);
+  }
+
+  /** A direction in which no body hides a point, rather from the side where the receiver's arm is not. */
+  private freeSide(center: Vector3): Vector3 {
+    const { giver, receiver } = this.view.people;
+    const side = receiver.elbow && receiver.elbow.x > this.state.pose.p[0] ? -1 : 1;
+    const bodies = [giver, receiver].flatMap(({ standsAt, group }) => (standsAt && group.visible ? [standsAt] : []));
+    const isFree = (from: Vector3) => {
+      const end = center.clone().addScaledVector(from.clone().normalize(), VIEW);
+      const way = new Line3(center.clone().setY(0), end.setY(0));
+      return bodies.every((body) => way.closestPointToPoint(body.clone().setY(0), true, new Vector3()).distanceTo(body.clone().setY(0)) > BODY);
+    };
+    const candidates = FROM.flatMap((from) => [side, -side].map((sign) => from.clone().multiply(new Vector3(sign, 1, 1))));
+    return candidates.find(isFree) ?? candidates[0]!;
   }
 
   private look(): void {

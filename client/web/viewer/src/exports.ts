@@ -47,6 +47,12 @@ function bake(mesh: Mesh): Mesh | null {
   if (uv) geometry.setAttribute("uv", uv);
   geometry.setIndex(mesh.geometry.index);
   geometry.computeVertexNormals();
+  // Vertices of flat triangles alone have none.
+  const normal = geometry.attributes.normal!;
+  for (let i = 0; i < normal.count; i++) {
+    point.fromBufferAttribute(normal, i);
+    if (Math.abs(point.length() - 1) > 1e-4) normal.setXYZ(i, 0, 1, 0);
+  }
   const own = (Array.isArray(mesh.material) ? mesh.material[0]! : mesh.material) as MeshStandardMaterial;
   const material = new MeshStandardMaterial({ vertexColors: Boolean(color), roughness: own.roughness ?? 0.8, metalness: own.metalness ?? 0, color: own.color ?? new Color("white"), map: own.map ?? null });
   const baked = new Mesh(geometry, material);

@@ -99,13 +99,14 @@ function splitAtWrist(geometry: BufferGeometry): void {
   for (let vertex = 0; vertex < position!.count; vertex++) {
     const bones = [0, 1, 2, 3].map((slot) => skinIndex!.getComponent(vertex, slot));
     const weights = [0, 1, 2, 3].map((slot) => skinWeight!.getComponent(vertex, slot));
-    const wrist = bones.findIndex((bone, slot) => bone === 0 && weights[slot]! > 0);
     const isNear = Math.hypot(position!.getX(vertex), position!.getY(vertex)) < 0.055;
-    const share = wrist < 0 || !isNear ? 0 : smoothstep(-WRIST_BAND, WRIST_BAND, position!.getZ(vertex));
-    const spare = weights.indexOf(Math.min(...weights));
-    if (share > 0 && spare !== wrist) {
-      [bones[spare], weights[spare]] = [FOREARM, weights[wrist]! * share];
-      weights[wrist]! *= 1 - share;
+    const share = isNear ? smoothstep(-WRIST_BAND, WRIST_BAND, position!.getZ(vertex)) : 0;
+    if (share > 0) {
+      const spare = weights.indexOf(Math.min(...weights));
+      weights[spare] = 0;
+      const rest = weights.reduce((a, b) => a + b, 0);
+      for (const slot of weights.keys()) weights[slot]! *= (1 - share) / rest;
+      [bones[spare], weights[spare]] = [FOREARM, share];
     }
     indices.set(bones, 4 * vertex);
     skinWeight!.setXYZW(vertex, weights[0]!, weights[1]!, weights[2]!, weights[3]!);

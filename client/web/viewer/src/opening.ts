@@ -7,7 +7,7 @@ import { Rigs } from "./rigs";
 import { findRequest, fromHash, HOLDOUTS, type State } from "./state";
 
 /** The holdout that is shown without a link. */
-const FIRST = "remote-hold1";
+const FIRST = "remote-genhold1";
 
 export class Opening {
   readonly state: State;

@@ -25,15 +25,15 @@ export function showPanels(app: App, parts: Parts): void {
   const side = byId("side");
   const answered = element("div", { id: "answered" });
   side.append(answered, giverSection(app), ...parts.sections);
-  app.onAnswer.push(() => app.answer && answered.replaceChildren(...answerPanel(app.answer)));
+  app.onAnswer.push(() => app.answer && answered.replaceChildren(...answerPanel(app.answer, () => void app.find())));
 }
 
 function showTop(app: App, parts: Parts): void {
   const objects = element("span");
   const holdouts = element("span");
   const rigs = element("span");
-  const undo = button("Undo", () => app.store.undo(), { title: "Ctrl+Z", id: "undo" });
-  const redo = button("Redo", () => app.store.redo(), { title: "Ctrl+Shift+Z" });
+  const undo = button("↶", () => app.store.undo(), { title: "Undo (Ctrl+Z)", "aria-label": "Undo", id: "undo" });
+  const redo = button("↷", () => app.store.redo(), { title: "Redo (Ctrl+Shift+Z)", "aria-label": "Redo", id: "redo" });
   const show = () => {
     const { state } = app;
     const names = app.objects.map(({ name }) => [name, objectName(name)] as [string, string]);

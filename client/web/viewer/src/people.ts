@@ -175,6 +175,8 @@ export class Person {
   private root: Vector3 | null = null;
   elbow: Vector3 | null = null;
   private shoulder: Vector3 | null = null;
+  /** Between the feet. */
+  standsAt: Vector3 | null = null;
 
   constructor(
     readonly name: string,
@@ -221,7 +223,14 @@ export class Person {
   /** Puts the person behind a given elbow: upright, and no nearer than the upper arm wants. */
   follow(side: Side, wrist: Matrix4, elbow: Vector3): void {
     this.side = side;
-    const rise = Math.min(Math.max(this.groundY() + SHOULDER.height - elbow.y, -0.8 * UPPER_ARM), 0.93 * UPPER_ARM);
+    const wanted = this.groundY() + SHOULDER.height - elbow.y;
+    const rise = Math.min(Math.max(wanted, -0.8 * UPPER_ARM), 0.93 * UPPER_ARM);
+    // Taller or shorter than people are: the arm is bent otherwise.
+    if (Math.abs(rise - wanted) > 0.14) {
+      this.leave();
+      this.reach(side, wrist);
+      return;
+    }
     const out = (side === "right" ? -1 : 1) * this.facing;
     const back = new Vector3(-0.5 * out, 0, -this.facing).normalize().multiplyScalar(Math.sqrt(UPPER_ARM ** 2 - rise ** 2));
     const shoulder = elbow.clone().add(back).add(new Vector3(0, rise, 0));
@@ -299,6 +308,7 @@ export class Person {
     const height = (shoulder.y - this.groundY()) / SHOULDER.height;
     mesh.scale.setScalar(Math.min(Math.max(height, 0.75), 1.2));
     mesh.position.set(root.x, this.groundY(), root.z);
+    this.standsAt = mesh.position;
     mesh.rotation.y = this.facing === 1 ? 0 : Math.PI;
   }
 }

@@ -1,12 +1,13 @@
 /** The shown request as code: curl, grpcurl, Python and Rust. */
-import { create, toJsonString } from "@bufbuild/protobuf";
+import { create, toJson } from "@bufbuild/protobuf";
 
 import { FindGraspRequestSchema } from "#contract/grasp_service_pb";
 import type { App } from "./app";
 
 /** The shown request in protobuf's JSON. */
 export function requestJson(app: App, prettySpaces = 0): string {
-  return toJsonString(FindGraspRequestSchema, create(FindGraspRequestSchema, app.request()), { prettySpaces });
+  const json = toJson(FindGraspRequestSchema, create(FindGraspRequestSchema, app.request()));
+  return JSON.stringify(json, (_, value: unknown) => (typeof value === "number" ? Number(value.toPrecision(7)) : value), prettySpaces);
 }
 
 const quoted = (text: string) => `'${text.replaceAll("'", `'\\''`)}'`;
