@@ -110,6 +110,11 @@ def test_calls_nothing_but_its_server_and_logs_no_error(seen, server):
 
 
 @needs_packages
+def test_poses_hands_as_the_server_does(seen):
+    assert seen["jointsOff"] < 1e-4
+
+
+@needs_packages
 def test_the_hand_touches_the_object_on_the_screen(seen):
     touch = seen["touch"]
     assert touch["beside"] > 50
@@ -182,3 +187,11 @@ def test_a_dropped_hand_is_posed_as_the_answer_says(seen):
 def test_a_recording_is_played(seen):
     assert seen["recording"]["object"] == "objects/scissors"
     assert seen["recording"]["status"] in {"Kept", "Adjusted", "Replanned", "None"}
+
+
+@needs_packages
+def test_a_tracked_hand_holds_the_object_out(seen):
+    xr = seen["xr"]
+    # The user faces +Z: the hand's right is the page's -x.
+    assert xr["there"][0] - xr["moved"][0] == pytest.approx(0.1, abs=0.02), xr
+    assert xr["status"] in {"Kept", "Adjusted", "Replanned", "None"}

@@ -18,10 +18,13 @@ const options = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swi
 const browser = await puppeteer.launch({ executablePath, headless: true, args: options, protocolTimeout: 120_000 });
 const page = await browser.newPage();
 const problems = [];
-page.on("console", (message) => ["error", "warn"].includes(message.type()) && problems.push(message.text()));
-page.on("pageerror", (error) => problems.push(String(error)));
 const requested = new Set();
-page.on("request", (request) => requested.add(new URL(request.url()).protocol === "blob:" ? "blob:" : new URL(request.url()).origin));
+function watch(page) {
+  page.on("console", (message) => ["error", "warn"].includes(message.type()) && problems.push(message.text()));
+  page.on("pageerror", (error) => problems.push(String(error)));
+  page.on("request", (request) => requested.add(new URL(request.url()).protocol === "blob:" ? "blob:" : new URL(request.url()).origin));
+}
+watch(page);
 
 const until = (condition, ...values) => page.waitForFunction(condition, { timeout: LONGEST, polling: 50 }, ...values);
 const text = (selector) => page.$eval(selector, (element) => element.textContent);
@@ -64,6 +67,19 @@ seen.frameMs = await page.evaluate(async () => {
 });
 await page.setViewport(LARGE);
 await picture("first");
+
+// The page's joints of an answer's angles are those of the answer.
+seen.jointsOff = await page.evaluate(() => {
+  const { app } = graspViewer;
+  const { hand } = app.answer.grasp;
+  const digits = ["thumb", "index", "middle", "ring", "little"].map((name) => {
+    const { baseYaw, basePitch, secondPitch, thirdPitch } = hand[name];
+    return [baseYaw, basePitch, secondPitch, thirdPitch];
+  });
+  const answered = app.view.receiver.joints;
+  const own = app.rigs.get(hand.rig, hand.handedness === 1 ? "left" : "right").joints(answered[1], hand.scale ?? 1, digits);
+  return Math.max(...own.map((joint, i) => Math.max(...joint.elements.map((value, j) => Math.abs(value - answered[i].elements[j])))));
+});
 
 // Where the pixels of the hand are beside those of the object, drawn in two flat colors.
 seen.touch = await page.evaluate(async () => {
@@ -281,6 +297,29 @@ await until(() => document.querySelector("#time").textContent.includes("motion.j
 await until(() => Number(document.querySelector("#scrub").value) >= 1 && !graspViewer.app.follower.isBusy);
 seen.recording = { object: await page.evaluate(() => graspViewer.app.state.object), status: await text("#outcome") };
 await picture("recording");
+
+// With an emulated headset, the user's own hand holds the object out.
+await page.close();
+const emulated = await browser.newPage();
+watch(emulated);
+await emulated.setViewport(SIZE);
+await emulated.evaluateOnNewDocument(`${readFileSync(path.join(process.env.NODE_PATH, "iwer/build/iwer.min.js"), "utf8")}
+  const device = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: false });
+  device.installRuntime({ forceInstall: true });
+  device.primaryInputMode = "hand";
+  device.hands.left.connected = false;
+  device.hands.right.position.set(0.05, 1.15, -0.45);
+  window.device = device;`);
+await emulated.goto(url);
+const inXr = (condition) => emulated.waitForFunction(condition, { timeout: LONGEST, polling: 100 });
+await inXr(() => window.graspViewer?.app.firstGraspMs != null && !document.querySelector("#xr").hidden);
+await emulated.click("#xr");
+await inXr(() => graspViewer.renderer.xr.isPresenting && graspViewer.app.answer.current !== undefined);
+const held = () => emulated.evaluate(() => graspViewer.app.view.object.group.matrix.elements.slice(12, 15));
+const there = await held();
+await emulated.evaluate(() => (device.hands.right.position.x += 0.1));
+await inXr(`Math.abs(graspViewer.app.view.object.group.matrix.elements[12] - ${there[0]}) > 0.05`);
+seen.xr = { there, moved: await held(), status: await emulated.$eval("#outcome", (pill) => pill.textContent) };
 
 seen.problems = problems;
 seen.requested = [...requested];

@@ -8,6 +8,7 @@ import { downloads, isaacGrasps, sceneGlb } from "./exports";
 import { Files } from "./files";
 import { Grips } from "./grips";
 import { Opening } from "./opening";
+import { ownHandButton } from "./own_hand";
 import { Painter } from "./paint";
 import { showPanels } from "./panels";
 import * as snippets from "./snippets";
@@ -34,6 +35,7 @@ showPanels(app, {
     { label: "Download…", title: "Scene and grasp as files", items: downloads(app) },
   ],
   sections: [new Grips(app).section, compareSection(app), painter.section],
+  extra: ownHandButton(app),
   addFile: () => files.choose(),
 });
 

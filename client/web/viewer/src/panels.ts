@@ -16,6 +16,8 @@ export interface Menu {
 export interface Parts {
   menus: Menu[];
   sections: HTMLElement[];
+  /** A further button. */
+  extra: HTMLElement;
   addFile: () => void;
 }
 
@@ -68,6 +70,7 @@ function showTop(app: App, parts: Parts): void {
     undo,
     redo,
     ...parts.menus.map((menu) => menuOf(menu)),
+    parts.extra,
     button("Copy link", () => copy(location.href, "the link"), { id: "link" }),
   );
 }

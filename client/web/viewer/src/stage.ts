@@ -38,6 +38,8 @@ export class Stage {
   readonly renderer: WebGLRenderer;
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(35, 1, 0.02, 60);
+  /** Moves the camera of a headset. */
+  readonly rig = new Group();
   readonly controls: OrbitControls;
   /** Everything but sky and ground. */
   readonly content = new Group();
@@ -59,7 +61,8 @@ export class Stage {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
-    this.scene.add(this.content, this.ground);
+    this.rig.add(this.camera);
+    this.scene.add(this.content, this.ground, this.rig);
     this.addLight();
     this.addSky();
     this.addGround();
@@ -175,7 +178,8 @@ export class Stage {
     this.draw(false);
   }
 
-  private resize(): void {
+  /** As large as its place on the page. */
+  resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement!;
     if (width === 0 || height === 0 || this.renderer.xr.isPresenting) return;
     this.renderer.setSize(width, height, false);
