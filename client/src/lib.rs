@@ -40,14 +40,14 @@
 pub mod built_in;
 mod client;
 mod error;
-#[cfg(feature = "json")]
-pub mod json;
 mod objects;
 mod retry;
 mod streams;
 
 pub use client::{GraspClient, GraspClientBuilder, Health};
 pub use error::{BoxError, CallError, ClientError, code_name};
+#[cfg(feature = "json")]
+pub use grasp_proto::json;
 pub use grasp_proto::{
     JOINT_COUNT, std_duration,
     v1::{

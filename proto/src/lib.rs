@@ -2,9 +2,13 @@
 
 mod answers;
 pub mod codec;
+#[cfg(feature = "json")]
+pub mod json;
+mod packed;
 mod requests;
 mod values;
 
+pub use packed::PackedGraspError;
 pub use values::{JOINT_COUNT, std_duration, wire_duration};
 
 /// Messages, clients and servers of package `grasp.v1`.

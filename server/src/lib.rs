@@ -29,7 +29,7 @@
 //! atlas_slots  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
-//! memory  objects  track
+//! connect  memory  objects  track
 //! atlases
 //! search
 //! services
@@ -46,6 +46,7 @@ mod atlases;
 mod budget;
 mod call;
 pub mod config;
+mod connect;
 mod convention;
 mod error;
 mod executor;

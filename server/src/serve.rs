@@ -30,6 +30,7 @@ use crate::{
     budget::DeadlineReserve,
     call::{BySize, Calls},
     config::{Config, StorePlace},
+    connect::{Connect, Transcoding},
     error::Limit,
     executor::SearchExecutor,
     limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
@@ -320,8 +321,9 @@ impl Server {
         );
         let origins = Arc::new(config.web_origins.clone());
         let is_web = *origins != WebOrigins::NONE;
+        let packers = Arc::new(Semaphore::new(config.io_threads.get()));
         let serving = transport::Server::builder()
-            // Even without gRPC-Web, to tell its clients that it is off.
+            // For Connect, and even without gRPC-Web, to tell its clients that it is off.
             .accept_http1(true)
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
             .http2_max_header_list_size(MAX_HEADERS as u32)
@@ -336,15 +338,20 @@ impl Server {
             .layer(cors(&origins))
             .layer(option_layer(config.viewer.then(viewer)))
             .layer(refuse_protocols(is_web))
+            .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
             .layer(Around(Calls {
                 in_flight: handler.calls.clone(),
                 uploads: builds,
                 upload_grace: 2 * config.streams.upload_idle,
-                packers: Arc::new(Semaphore::new(config.io_threads.get())),
+                packers: Arc::clone(&packers),
                 largest_upload,
                 reserve: Arc::clone(&handler.reserve),
                 longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
+            }))
+            .layer(Around(Transcoding {
+                largest_upload,
+                places: packers,
             }))
             .add_service(grasps)
             .add_service(objects)

@@ -18,7 +18,7 @@ import pytest
 from conftest import ROOT, start_server, stop_server
 
 DEFAULT_HOST, DEFAULT_PORT = "::1", 50051
-PAGES = ["README.md", "proto/CALLS.md", "client/README.md", "server/HANDS.md"]
+PAGES = ["README.md", "proto/CALLS.md", "proto/ERRORS.md", "client/README.md", "server/HANDS.md"]
 START_SERVER = "cargo run --release -p grasp-server"
 # Exit code of grpcurl at a call's deadline.
 DEADLINE_EXCEEDED = 64 + 4
@@ -137,11 +137,20 @@ def test_files_that_contributing_names_exist():
         assert (ROOT / name).exists(), name
 
 
+def test_the_page_of_errors_lists_every_reason_once():
+    reasons = re.findall(r"ERROR_REASON_(\w+) = [1-9]", (ROOT / "proto/grasp/v1/error_reason.proto").read_text())
+    rows = re.findall(r"^\| (`.*?) \| `\w+` \|", (ROOT / "proto/ERRORS.md").read_text(), flags=re.MULTILINE)
+    assert sorted(reason for row in rows for reason in re.findall(r"`(\w+)`", row)) == sorted(reasons)
+
+
 SERVER_PAGE = ROOT / "server/README.md"
 LINKED = [
     "README.md",
     "proto/README.md",
     "proto/CALLS.md",
+    "proto/ERRORS.md",
+    "proto/LIMITS.md",
+    "proto/PACKED.md",
     "client/README.md",
     "server/README.md",
     "server/HANDS.md",

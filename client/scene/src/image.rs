@@ -51,6 +51,11 @@ impl Image {
         bytes
     }
 
+    /// The bytes with the lowest two bits of each channel cleared: an animation is half as large, and nobody sees it.
+    fn coarse(&self) -> Vec<u8> {
+        self.rgb.iter().map(|byte| byte & !3 | byte >> 6).collect()
+    }
+
     /// The same image with a line of text below. Characters outside printable ASCII show as "?"; excess text is cut.
     fn with_caption(&self, caption: &str) -> Self {
         let mut image = Self::blank(self.width, self.height + CAPTION_HEIGHT);
@@ -95,6 +100,30 @@ pub fn contact_sheet(images: &[(Image, String)], columns: usize) -> Option<Image
         sheet.paste(&image.with_caption(caption), left, top);
     }
     Some(sheet)
+}
+
+/// Images of the same size, `rate` per second, as an animated PNG file in an endless loop.
+pub(crate) fn to_animated_png(images: &[Image], rate: u16) -> Vec<u8> {
+    let Some(first) = images.first() else {
+        return Vec::new();
+    };
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, first.width as u32, first.height as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder.set_compression(png::Compression::High);
+    let written = encoder
+        .set_animated(images.len() as u32, 0)
+        .and_then(|()| encoder.set_frame_delay(1, rate))
+        .and_then(|()| encoder.write_header())
+        .and_then(|mut writer| {
+            images
+                .iter()
+                .try_for_each(|image| writer.write_image_data(&image.coarse()))
+        });
+    written.expect("writing to memory cannot fail and images have as many bytes as their size says");
+    bytes
 }
 
 fn text_width(text: &str) -> usize {

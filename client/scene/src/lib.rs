@@ -11,6 +11,7 @@ mod glb;
 mod handover;
 mod hands;
 mod image;
+mod moving;
 mod parts;
 mod people;
 mod receiver;

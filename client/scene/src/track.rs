@@ -9,9 +9,11 @@ use crate::{
     glb::{MovingHand, MovingHandover, to_moving_glb},
     handover::CannotDraw,
     hands::{PosedHand, giver, synthesis_pose},
+    moving::to_picture,
     parts::Part,
     people::Person,
     receiver::Receiver,
+    render::ViewSize,
 };
 
 /// Seconds between frames without capture times: as a headset sends them, 90 per second.
@@ -53,6 +55,18 @@ impl TrackRecording {
     /// # Errors
     /// The convention is not that of `OpenXR`, a hand's rig is not built in, or a hand is given as a mesh.
     pub fn to_glb(&self, object: Part) -> Result<Vec<u8>, CannotDraw> {
+        Ok(to_moving_glb(&self.handover(object)?))
+    }
+
+    /// The same motion as an animated PNG file, from a camera that sees all of it.
+    ///
+    /// # Errors
+    /// As of [`Self::to_glb`].
+    pub fn to_picture(&self, object: Part, size: ViewSize) -> Result<Vec<u8>, CannotDraw> {
+        Ok(to_picture(&self.handover(object)?, size))
+    }
+
+    fn handover(&self, object: Part) -> Result<MovingHandover, CannotDraw> {
         if !matches!(self.convention, Convention::Unspecified | Convention::Openxr) {
             return Err(CannotDraw(
                 "animations require a motion in the openxr convention".to_owned(),
@@ -60,12 +74,12 @@ impl TrackRecording {
         }
         let mut hands = self.givers()?;
         hands.extend(self.receivers()?);
-        Ok(to_moving_glb(&MovingHandover {
+        Ok(MovingHandover {
             object,
             times: self.times(),
             client_from_object: self.object_poses(),
             hands,
-        }))
+        })
     }
 
     fn times(&self) -> Vec<f32> {

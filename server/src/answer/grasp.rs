@@ -40,7 +40,7 @@ pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v
         .into(),
         hand: Some(wire_hand(&key_frame.pose, hand, frame)),
     };
-    v1::Grasp {
+    let mut message = v1::Grasp {
         hand: Some(wire_hand(&grasp.pose, hand, frame)),
         contacts: contacts
             .map(|((contact, &force), torsion)| wire_contact(contact, force, torsion, frame.convention))
@@ -72,7 +72,12 @@ pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v
             comfort: grasp.comfort,
             wrench_angle: grasp.wrench_angle,
         }),
+        packed: Vec::new(),
+    };
+    if frame.packs {
+        message.packed = message.pack();
     }
+    message
 }
 
 /// A grasp that the client knows, except for where it is now.

@@ -38,6 +38,8 @@ pub(crate) struct ClientFrame {
     pub convention: Convention,
     /// The object in the client's frame, in `OpenXR` axes.
     pub client_from_object: Pose,
+    /// True if grasps are packed as well.
+    pub packs: bool,
 }
 
 impl ClientFrame {

@@ -47,7 +47,7 @@ const AWAITED_STREAMS: [&str; 3] = [
 const BEFORE_TRANSPORT: Duration = Duration::from_millis(1);
 
 /// True if a method takes large messages, once its call is admitted.
-fn is_upload(path: &str) -> bool {
+pub(crate) fn is_upload(path: &str) -> bool {
     UPLOAD_METHODS.contains(&path)
 }
 

@@ -18,7 +18,8 @@ use tokio::sync::watch;
 use tonic::{Code, body::Body};
 
 pub(crate) use self::{
-    layer::{BySize, Calls},
+    layer::{BySize, Calls, is_upload},
+    packing::Messages as FramedMessages,
     upload::UploadPermit,
 };
 use crate::{

@@ -98,7 +98,7 @@ impl FrameFilter for Packer {
 }
 
 /// The messages of a frame, each with its prefix and without. An incomplete message can only be the last.
-struct Messages(Bytes);
+pub(crate) struct Messages(pub(crate) Bytes);
 
 impl Iterator for Messages {
     type Item = (Bytes, Bytes);

@@ -166,6 +166,7 @@ impl PreparedJob {
         ClientFrame {
             convention: self.query.convention,
             client_from_object: self.query.client_from_object,
+            packs: self.query.packs,
         }
     }
 

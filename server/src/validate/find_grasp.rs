@@ -63,6 +63,8 @@ pub(crate) struct FindQuery {
     pub plan_key_frames: bool,
     /// True to answer only the changes of a grasp that is kept.
     pub changes_only: bool,
+    /// Also send grasps packed.
+    pub packs: bool,
     pub current: Option<CurrentGraspQuery>,
 }
 
@@ -219,6 +221,7 @@ pub(super) fn checked_query(
         is_replay,
         plan_key_frames: output.key_frames,
         changes_only: output.changes_only,
+        packs: output.packed,
         current,
     })
 }

@@ -1,6 +1,6 @@
-//! Pages in browsers: who may call, how browsers learn it, and the refusal of other protocols than gRPC and gRPC-Web.
+//! Pages in browsers: who may call, how browsers learn it, and the refusal of other protocols than gRPC, gRPC-Web and Connect.
 //!
-//! gRPC-Web itself is a layer of tonic-web. A browser names the page's origin with every call. Pages of other origins than those of
+//! gRPC-Web itself is a layer of tonic-web, and Connect the module `connect`. A browser names the page's origin with every call. Pages of other origins than those of
 //! the configuration are refused here: cross-origin rules alone would only keep them from reading the answer, and not even that
 //! once their own host name resolves to this server (DNS rebinding).
 
@@ -26,22 +26,27 @@ pub(crate) use origins::{NEEDED_ORIGINS, parse_origins};
 /// How long a browser may cache the rules; the longest that browsers accept.
 const REMEMBERED: Duration = Duration::from_hours(2);
 
-/// Headers of requests that pages may set: those of gRPC-Web's clients, and of the Connect protocol's, so that they can read why they
-/// are refused.
-const REQUEST_HEADERS: [HeaderName; 6] = [
+/// Headers of requests that pages may set: those of the clients of gRPC-Web and Connect.
+const REQUEST_HEADERS: [HeaderName; 9] = [
+    HeaderName::from_static("connect-accept-encoding"),
+    HeaderName::from_static("connect-content-encoding"),
     HeaderName::from_static("connect-protocol-version"),
     HeaderName::from_static("connect-timeout-ms"),
+    header::CONTENT_ENCODING,
     header::CONTENT_TYPE,
     HeaderName::from_static("grpc-timeout"),
     HeaderName::from_static("x-grpc-web"),
     HeaderName::from_static("x-user-agent"),
 ];
 
-/// Headers of answers that pages may read: the status of an answer without messages.
-const ANSWER_HEADERS: [HeaderName; 3] = [
+/// Headers of answers that pages may read: the status of an answer without messages, and how messages are packed.
+const ANSWER_HEADERS: [HeaderName; 6] = [
+    HeaderName::from_static("connect-content-encoding"),
+    header::CONTENT_ENCODING,
     HeaderName::from_static("grpc-message"),
     HeaderName::from_static("grpc-status"),
     HeaderName::from_static("grpc-status-details-bin"),
+    HeaderName::from_static("trailer-grpc-retry-pushback-ms"),
 ];
 
 const GRPC: [&str; 2] = ["application/grpc", "application/grpc+proto"];
@@ -74,6 +79,9 @@ pub(crate) fn cors(origins: &Arc<WebOrigins>) -> CorsLayer {
         .allow_methods([Method::POST])
         .allow_headers(REQUEST_HEADERS)
         .expose_headers(ANSWER_HEADERS)
+        // Pages of other networks than the server's, whose browsers ask first (Private Network Access). Those that may not call are
+        // refused before.
+        .allow_private_network(true)
         .max_age(REMEMBERED)
 }
 
@@ -127,7 +135,7 @@ fn refusal(status: StatusCode, content_type: &'static str, body: String) -> Resp
     answer
 }
 
-/// Refuses requests that are neither gRPC over HTTP/2 nor, if browsers are served, gRPC-Web.
+/// Refuses requests that are neither gRPC over HTTP/2 nor Connect nor, if browsers are served, gRPC-Web.
 pub(crate) fn refuse_protocols(is_web: bool) -> Around<Refusal> {
     refuse(move |request| {
         let (status, cause) = wrong(request, is_web)?;
@@ -149,22 +157,23 @@ pub(crate) fn refuse_protocols(is_web: bool) -> Around<Refusal> {
 /// Why a request is refused: the status of its answer, and the cause.
 fn wrong(request: &mut Parts, is_web: bool) -> Option<(StatusCode, String)> {
     let spoken = if is_web {
-        "this server speaks gRPC over HTTP/2, and gRPC-Web"
+        "this server speaks gRPC over HTTP/2, gRPC-Web, and Connect"
     } else {
-        "this server speaks gRPC over HTTP/2, and not gRPC-Web because its setting web_origins is none"
+        "this server speaks gRPC over HTTP/2, and Connect, but not gRPC-Web because its setting web_origins is none"
     };
     if request.method != Method::POST {
         let method = quoted(request.method.as_str());
-        let cause = format!("{spoken}; calls of either have the method POST, and this request {method}");
+        let cause = format!("{spoken}; all calls have the method POST, and this request {method}");
         return Some((StatusCode::METHOD_NOT_ALLOWED, cause));
     }
     let given = request.headers.get(header::CONTENT_TYPE);
     let given = given.map_or("", |value| value.to_str().unwrap_or("?")).to_owned();
     let media = media_type(&given).to_ascii_lowercase();
+    let connect = CONNECT.iter().find(|known| **known == media);
     let web = GRPC_WEB.iter().find(|known| **known == media);
     let is_grpc = GRPC.contains(&media.as_str());
-    match web {
-        Some(known) if is_web => {
+    match connect.or(web) {
+        Some(known) if is_web || connect.is_some() => {
             let known = HeaderValue::from_static(known);
             request.headers.insert(header::CONTENT_TYPE, known);
             None
@@ -175,20 +184,15 @@ fn wrong(request: &mut Parts, is_web: bool) -> Option<(StatusCode, String)> {
             let cause = format!("{spoken}; this request is gRPC over {:?}", request.version);
             Some((StatusCode::BAD_REQUEST, cause))
         }
-        None if is_connect(&request.headers) => {
-            let cause = format!(
-                "{spoken}; this request is of the Connect protocol: choose the transport of gRPC-Web or gRPC"
-            );
-            Some((StatusCode::UNSUPPORTED_MEDIA_TYPE, cause))
-        }
         None => {
             let given = if given.is_empty() {
                 "missing".to_owned()
             } else {
                 format!("is {}", quoted(&given))
             };
-            let mut right = vec![GRPC.join(" or ")];
+            let mut right = vec![format!("over Connect {}", CONNECT.join(" or "))];
             right.extend(is_web.then(|| format!("over gRPC-Web {}", GRPC_WEB.join(" or "))));
+            right.push(format!("over gRPC {}", GRPC.join(" or ")));
             let cause = format!("{spoken}; content-type {given}; it must be {}", right.join(", "));
             Some((StatusCode::UNSUPPORTED_MEDIA_TYPE, cause))
         }

@@ -10,7 +10,7 @@ use grasp_tests::TestServer;
 use crate::fixtures::{find, hand as hand_of, held_remote, reproducible, vec3, with};
 
 /// An engine's axes (columns: where `OpenXR`'s x, y and z go), its unit, and the turn of its hand joints.
-struct Engine {
+pub(crate) struct Engine {
     convention: v1::Convention,
     axes: Mat3,
     /// Axes of meshes and of objects' frames.
@@ -20,7 +20,7 @@ struct Engine {
     wrist_place: usize,
 }
 
-fn engines() -> [Engine; 5] {
+pub(crate) fn engines() -> [Engine; 5] {
     let unity = Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z);
     let unreal = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X);
     let flipped = Mat3::from_cols(Vec3::NEG_X, Vec3::Y, Vec3::Z);
@@ -106,7 +106,7 @@ impl Engine {
     }
 
     /// A request of the `OpenXR` convention in the engine's.
-    fn request(&self, openxr: &v1::FindGraspRequest) -> v1::FindGraspRequest {
+    pub(crate) fn request(&self, openxr: &v1::FindGraspRequest) -> v1::FindGraspRequest {
         let mut request = openxr.clone().with_convention(self.convention);
         let holdout = request.holdout_mut();
         holdout.client_from_object = holdout

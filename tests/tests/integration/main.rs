@@ -5,6 +5,7 @@ mod conventions;
 mod examples;
 mod find_grasp;
 mod fixtures;
+mod golden;
 mod known_grips;
 mod load;
 mod module_order;

@@ -23,7 +23,7 @@ const SERVER: &[&[&str]] = &[
     &["atlas_slots", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],
-    &["memory", "objects", "track"],
+    &["connect", "memory", "objects", "track"],
     &["atlases"],
     &["search"],
     &["services"],

@@ -17,7 +17,7 @@ use grasp_client::{
     v1::{Track, TrackAnswer, TrackFrame},
     wire_duration,
 };
-use grasp_scene::TrackRecording;
+use grasp_scene::{TrackRecording, ViewSize};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::time::{MissedTickBehavior, interval};
@@ -36,6 +36,12 @@ use motions::Moving;
 /// How long to wait for the answer to the last frame.
 const LAST_ANSWER: Duration = Duration::from_secs(2);
 
+/// Size of a moving picture: it fits into a page.
+const PICTURE: ViewSize = ViewSize {
+    width: 480,
+    height: 320,
+};
+
 /// The long help: the shape of a motion as JSON.
 const ABOUT: &str = r#"Hold on to a grasp while the giver moves, and show what becomes of it.
 
@@ -46,8 +52,8 @@ The motion is one of the built-in ones (--moving) of a built-in holdout (--holdo
 --print-motion prints a built-in one as a template. Frames are sent at their capture times, and nobody waits for answers: a
 frame may overtake another one. With --json, one line per TrackAnswer in protobuf's JSON, and a last one with the summary.
 
---glb writes the motion as an animation, a key frame per frame, for Blender, three.js and other viewers of binary glTF. It shows
-giver and object as they were sent, and a receiver who goes for the answered grasps at the speed of a person; without a grasp,
+--glb writes the motion as an animation, a key frame per frame, for Blender, three.js and other viewers of binary glTF, and --png as a
+moving picture. Both show giver and object as they were sent, and a receiver who goes for the answered grasps at the speed of a person; without a grasp,
 the open hand waits."#;
 
 /// Hold on to a grasp while the giver moves, and show what becomes of it.
@@ -85,6 +91,9 @@ pub(crate) struct Arguments {
     /// Write the motion as a binary glTF file with an animation.
     #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
     glb: Option<PathBuf>,
+    /// Write the motion as an animated PNG file, 15 pictures per second.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
+    png: Option<PathBuf>,
     #[command(flatten)]
     server: ServerOptions,
 }
@@ -113,8 +122,9 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     }
     let client = arguments.server.connect().await?;
     // Before the motion is played: reports a scene that cannot be drawn.
-    let object = match (&arguments.glb, &motion.track.holdout) {
-        (Some(_), Some(holdout)) => Some(drawn_object(&client, holdout).await?),
+    let is_drawn = arguments.glb.is_some() || arguments.png.is_some();
+    let object = match &motion.track.holdout {
+        Some(holdout) if is_drawn => Some(drawn_object(&client, holdout).await?),
         _ => None,
     };
     let mut track = client.track(&motion.track).await?;
@@ -128,8 +138,17 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     };
     played.play(&mut track, &motion.frames).await?;
     let tally = played.tally;
-    if let (Some(path), Some(object), Some(recording)) = (arguments.glb, object, played.recording) {
-        blocking(move || write_file(&path, &recording.to_glb(object)?)).await?;
+    if let (Some(object), Some(recording)) = (object, played.recording) {
+        let (glb, png) = (arguments.glb, arguments.png);
+        blocking(move || {
+            if let Some(path) = glb {
+                write_file(&path, &recording.to_glb(object.clone())?)?;
+            }
+            png.map_or(Ok(()), |path| {
+                write_file(&path, &recording.to_picture(object, PICTURE)?)
+            })
+        })
+        .await?;
     }
     write_line(&if output.json {
         tally.to_json().to_string()

@@ -230,7 +230,7 @@ prop_compose! {
                 replay_attempt: replay_attempt.filter(|_| handedness > 0 && current.is_none()),
                 ..v1::SearchOptions::default()
             }),
-            output: Some(v1::OutputOptions { convention, key_frames: !both_hands, changes_only }),
+            output: Some(v1::OutputOptions { convention, key_frames: !both_hands, changes_only, packed: false }),
             current: current.filter(|_| !both_hands),
         }
     }
