@@ -32,6 +32,14 @@ export const HELD_HEIGHT = 1.12;
 const PANELS = { left: 90, right: 320, top: 54 };
 const NARROW = 760;
 
+/** Pixels per point, while a slow picture moves, and else. */
+const COARSE = 0.5;
+const FINE = Math.min(devicePixelRatio, 2);
+
+/** A picture is slow that takes longer, and the page still after, in milliseconds. */
+const SLOW = 120;
+const STILL = 250;
+
 const SKY = { top: new Color("#0d131c"), horizon: new Color("#3a4a5e") };
 
 export class Stage {
@@ -54,7 +62,7 @@ export class Stage {
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(FINE);
     this.renderer.toneMapping = NeutralToneMapping;
     this.renderer.toneMappingExposure = 0.92;
     this.renderer.outputColorSpace = SRGBColorSpace;
@@ -93,6 +101,7 @@ export class Stage {
   }
 
   private isLooping = false;
+  private refining = 0;
   private hasStarted = false;
   private readonly afterwards: (() => void)[] = [];
 
@@ -104,15 +113,27 @@ export class Stage {
 
   private loop(): void {
     this.isLooping = true;
-    this.renderer.setAnimationLoop(() => {
+    clearTimeout(this.refining);
+    let last = 0;
+    this.renderer.setAnimationLoop((now) => {
       if (!this.wanted && !this.renderer.xr.isPresenting) {
         this.renderer.setAnimationLoop(null);
         this.isLooping = false;
+        this.refining = window.setTimeout(() => this.sharpen(FINE), STILL);
         return;
       }
+      if (last > 0 && now - last > SLOW && !this.renderer.xr.isPresenting) this.sharpen(COARSE);
+      last = now;
       this.wanted = false;
       this.picture();
     });
+  }
+
+  /** Where there is no fast graphics card, pictures are coarse while something moves, and fine once all is still. */
+  private sharpen(pixelRatio: number): void {
+    if (this.isLooping === (pixelRatio === FINE) || this.renderer.getPixelRatio() === pixelRatio) return;
+    this.renderer.setPixelRatio(pixelRatio);
+    if (!this.isLooping) this.picture();
   }
 
   private picture(): void {
