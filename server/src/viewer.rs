@@ -20,7 +20,10 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 
 /// A layer that answers GET and HEAD of `/` with the page.
 pub(crate) fn viewer() -> Around<Viewer> {
     let hash = Sha256::digest(PAGE);
-    let etag = hash[..8].iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let etag = hash[..8]
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect::<String>();
     Around(Viewer {
         etag: HeaderValue::try_from(format!("\"{etag}\"")).unwrap_or(HeaderValue::from_static("\"\"")),
     })
@@ -48,7 +51,9 @@ impl<B> Middleware<B> for Viewer {
 
 impl Viewer {
     fn answer(&self, asked: &HeaderMap, is_head: bool) -> Response<Body> {
-        let is_known = asked.get(header::IF_NONE_MATCH).is_some_and(|known| lists(known, &self.etag));
+        let is_known = asked
+            .get(header::IF_NONE_MATCH)
+            .is_some_and(|known| lists(known, &self.etag));
         let takes_gzip = asked.get_all(header::ACCEPT_ENCODING).iter().any(is_gzip_among);
         let mut answer = Response::new(Body::default());
         let headers = answer.headers_mut();
@@ -86,7 +91,10 @@ fn lists(known: &HeaderValue, etag: &HeaderValue) -> bool {
     let (Ok(known), Ok(etag)) = (known.to_str(), etag.to_str()) else {
         return false;
     };
-    known.split(',').map(str::trim).any(|tag| tag == "*" || tag.trim_start_matches("W/") == etag)
+    known
+        .split(',')
+        .map(str::trim)
+        .any(|tag| tag == "*" || tag.trim_start_matches("W/") == etag)
 }
 
 fn is_gzip_among(accepted: &HeaderValue) -> bool {
@@ -131,7 +139,10 @@ mod tests {
         }
         for accepted in ["br", "gzip;q=0", "identity"] {
             let (answer, body) = ask(&[(header::ACCEPT_ENCODING, accepted)], false).await;
-            assert!(!answer.headers().contains_key(header::CONTENT_ENCODING), "{accepted}");
+            assert!(
+                !answer.headers().contains_key(header::CONTENT_ENCODING),
+                "{accepted}"
+            );
             assert!(body.starts_with(b"<!doctype html>"));
             assert_eq!(answer.headers()[header::CONTENT_LENGTH], body.len().to_string());
         }
@@ -144,7 +155,10 @@ mod tests {
         let etag = answer.headers()[header::ETAG].to_str().unwrap().to_owned();
         for known in [etag.clone(), format!("\"other\", W/{etag}"), "*".to_owned()] {
             let (answer, body) = ask(&[(header::IF_NONE_MATCH, &known)], false).await;
-            assert!(body.is_empty() && answer.status() == StatusCode::NOT_MODIFIED, "{known}");
+            assert!(
+                body.is_empty() && answer.status() == StatusCode::NOT_MODIFIED,
+                "{known}"
+            );
         }
         let (answer, _) = ask(&[(header::IF_NONE_MATCH, "\"other\"")], false).await;
         assert_eq!(answer.status(), StatusCode::OK);

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import urllib.error
 import urllib.request
@@ -54,6 +55,15 @@ def test_a_server_without_the_option_has_no_page(address):
     with pytest.raises(urllib.error.HTTPError) as refused:
         get(f"http://{address}/")
     assert refused.value.code == 405
+
+
+def test_the_command_line_serves_the_page_until_it_is_interrupted():
+    process = subprocess.Popen([ROOT / "target/release/grasp", "view", "--no-open"], stdout=subprocess.PIPE, text=True)
+    url = re.search(r"http://\S+/", process.stdout.readline()).group(0)
+    with get(url) as answer:
+        assert answer.read().startswith(b"<!doctype html>")
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=20) == 130
 
 
 @needs_packages

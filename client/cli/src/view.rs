@@ -67,7 +67,12 @@ fn open(url: &str) {
         "xdg-open"
     };
     let quiet = Stdio::null;
-    let started = Command::new(opener).arg(url).stdin(quiet()).stdout(quiet()).stderr(quiet()).spawn();
+    let started = Command::new(opener)
+        .arg(url)
+        .stdin(quiet())
+        .stdout(quiet())
+        .stderr(quiet())
+        .spawn();
     if let Err(error) = started {
         tracing::info!(%error, opener, "cannot open a browser");
     }
