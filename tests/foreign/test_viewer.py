@@ -149,12 +149,15 @@ def test_copies_the_request_as_code_that_runs(seen, tmp_path):
     run = subprocess.run(["bash", "-c", seen["code"]["grpcurl"]], env=environment, cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert run.returncode == 0, run.stderr
     assert json.loads(run.stdout)["outcome"] in {"OUTCOME_FOUND", "OUTCOME_BUDGET_EXHAUSTED"}
+    run = subprocess.run(["bash", "-c", seen["code"]["curl"]], capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["outcome"] in {"OUTCOME_FOUND", "OUTCOME_BUDGET_EXHAUSTED"}
     python = tmp_path / "snippet.py"
     python.write_text(seen["code"]["python"])
     environment["PYTHONPATH"] = str(ROOT / "target/foreign")
     run = subprocess.run([ROOT / "target/foreign/venv/bin/python", python], env=environment, capture_output=True, text=True, timeout=60)
     assert run.returncode == 0, run.stderr
-    assert "FindGrasp" in seen["code"]["curl"] and "GraspClient::connect" in seen["code"]["rust"]
+    assert "GraspClient::connect" in seen["code"]["rust"]
 
 
 @needs_packages

@@ -228,7 +228,8 @@ impl RawConfig {
         read!(number(maximum_connections => config.maximum_connections, 1..=1_000_000));
         read!(number(maximum_unread_bytes => config.maximum_unread_bytes, MAX_RESPONSE as u64..=1 << 30));
         read!(text(web_origins => config.web_origins, NEEDED_ORIGINS, parse_origins));
-        read!(flag(viewer => config.viewer,));
+        config.viewer = self.viewer.or(fallback.viewer).unwrap_or(config.viewer);
+        self.viewer = Some(config.viewer);
         read!(time(drain_ms => config.drain, 0..=600_000));
         let rig = |name: &str| RIG_NAMES.contains(&name).then(|| name.to_owned());
         read!(text(default_rig => config.default_rig, &RIG_NAMES.join(" or "), rig));
@@ -288,11 +289,6 @@ impl Check {
             self.reject(key, "\"\"", "a folder, or absent");
         }
         value.clone_from(raw);
-    }
-
-    fn flag(&mut self, _key: &str, raw: &mut Option<bool>, value: &mut bool) {
-        *value = raw.unwrap_or(*value);
-        *raw = Some(*value);
     }
 
     fn text<T: fmt::Display>(
