@@ -26,7 +26,7 @@
 //!
 //! ```text
 //! budget  convention  error  listen  middleware  wire
-//! health_check  limits
+//! health_check  limits  viewer
 //! atlas_slots  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
@@ -65,6 +65,7 @@ mod serve;
 mod services;
 mod track;
 mod validate;
+mod viewer;
 mod web;
 mod wire;
 

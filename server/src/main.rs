@@ -12,7 +12,7 @@ use std::{
 use clap::{CommandFactory as _, Parser};
 use futures_util::future::select_all;
 use grasp_server::{
-    Config, Listener, Server, check_health,
+    Config, ListenAddress, Listener, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
     is_reserved_memory_limited, warn_of_memory,
 };
@@ -164,7 +164,13 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
         select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
     };
     for listener in &listeners {
-        tracing::info!(address = %listener.address()?, workers = config.workers, "serving");
+        let address = listener.address()?;
+        tracing::info!(%address, workers = config.workers, "serving");
+        if let ListenAddress::Tcp(address) = address
+            && config.viewer
+        {
+            tracing::info!("the viewer is at http://{address}/");
+        }
     }
     server.serve(listeners, shutdown).await?;
     Ok(())

@@ -47,6 +47,7 @@ use crate::{
     saved::{SavedFiles, StoreError},
     services::{BYTES_PER_PERMIT, Handler, Shared, load_saved_rigs},
     track::OpenTracks,
+    viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
 };
 
@@ -341,6 +342,7 @@ impl Server {
             .layer(Around(UnreadCount))
             .layer(refuse_origins(&origins))
             .layer(cors(&origins))
+            .layer(option_layer(config.viewer.then(viewer)))
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))

@@ -12,6 +12,7 @@ mod output;
 mod rigs;
 mod track;
 mod validate;
+mod view;
 
 use std::process::ExitCode;
 
@@ -58,6 +59,7 @@ enum Command {
     Validate(validate::Arguments),
     Evaluate(evaluate::Arguments),
     Track(track::Arguments),
+    View(view::Arguments),
     Objects(objects::Arguments),
     Rigs(rigs::Arguments),
     Bake(bake::Arguments),
@@ -138,6 +140,7 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Objects(arguments) => objects::run(arguments, output).await.map(done),
         Command::Rigs(arguments) => rigs::run(arguments, output).await.map(done),
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
+        Command::View(arguments) => Box::pin(view::run(arguments, output)).await,
         Command::Track(arguments) => Box::pin(track::run(arguments, output)).await,
         Command::Health(server) => health(&server, output).await,
         Command::Completions { shell } => completions(shell, output).map(done),

@@ -84,6 +84,8 @@ pub struct Config {
     pub maximum_unread_bytes: NonZeroUsize,
     /// Origins of the pages that may call from browsers.
     pub web_origins: WebOrigins,
+    /// Serve the page that shows grasps in a browser at `/`.
+    pub viewer: bool,
     /// How long to wait for running calls at shutdown.
     pub drain: Duration,
     /// Rig of the receiving hand if a request names none. Under `THESIS` validity it is always the rig `thesis`.
@@ -135,6 +137,7 @@ impl Default for Config {
             maximum_connections: non_zero(1000),
             maximum_unread_bytes: non_zero(32 << 20),
             web_origins: WebOrigins::LOOPBACK,
+            viewer: false,
             drain: Duration::from_secs(10),
             default_rig: "adult".to_owned(),
             log_format: LogFormat::Text,

@@ -143,6 +143,9 @@ pub struct RawConfig {
     /// Loopback are pages of localhost, 127.0.0.1 and `[::1]`, with any port. With none, browsers are not served.
     #[arg(long, env = "GRASP_WEB_ORIGINS", value_name = "ORIGINS")]
     pub web_origins: Option<String>,
+    /// Serve a page at `/` that shows objects, hands and grasps in a browser [default: false].
+    #[arg(long, env = "GRASP_VIEWER", value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    pub viewer: Option<bool>,
     /// How long to wait for running calls at shutdown, in milliseconds [default: 10000].
     #[arg(long, env = "GRASP_DRAIN_MS", value_name = "MS")]
     pub drain_ms: Option<u64>,
@@ -244,6 +247,8 @@ impl RawConfig {
         read!(number(maximum_connections => config.maximum_connections, 1..=1_000_000));
         read!(number(maximum_unread_bytes => config.maximum_unread_bytes, MAX_RESPONSE as u64..=1 << 30));
         read!(text(web_origins => config.web_origins, NEEDED_ORIGINS, parse_origins));
+        config.viewer = self.viewer.or(fallback.viewer).unwrap_or(config.viewer);
+        self.viewer = Some(config.viewer);
         read!(time(drain_ms => config.drain, 0..=600_000));
         let rig = |name: &str| RIG_NAMES.contains(&name).then(|| name.to_owned());
         read!(text(default_rig => config.default_rig, &RIG_NAMES.join(" or "), rig));
@@ -380,7 +385,7 @@ mod tests {
         assert_eq!(read, raw);
         assert_eq!(read.complete(RawConfig::default()).unwrap(), config);
         // Every value is printed but that of an absent folder.
-        assert_eq!(text.lines().count(), 31, "{text}");
+        assert_eq!(text.lines().count(), 32, "{text}");
         let error = toml::from_str::<RawConfig>("wokers = 3").unwrap_err();
         assert!(error.to_string().contains("wokers"), "{error}");
     }
@@ -395,6 +400,8 @@ mod tests {
             for (key, value) in &mut keys {
                 *value = match value {
                     toml::Value::Integer(_) => number.into(),
+                    // Either value is valid.
+                    toml::Value::Boolean(_) => continue,
                     _ if key == "log" => "a=b=c".into(),
                     _ => "".into(),
                 };

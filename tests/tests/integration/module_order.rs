@@ -12,7 +12,7 @@ use std::{
 /// The server's top-level modules, as documented in its `lib.rs`.
 const SERVER: &[&[&str]] = &[
     &["budget", "convention", "error", "listen", "middleware", "wire"],
-    &["health_check", "limits"],
+    &["health_check", "limits", "viewer"],
     &["atlas_slots", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],
