@@ -49,9 +49,13 @@ def is_whole(command):
     return True
 
 
+# Parts of the README that open: first calls in other languages, which the tests of the clients run.
+OPENED = re.compile(r"<details>.*?</details>", flags=re.DOTALL)
+
+
 def commands():
     """The commands of the pages' sh blocks."""
-    text = "\n".join((ROOT / page).read_text() for page in PAGES)
+    text = OPENED.sub("", "\n".join((ROOT / page).read_text() for page in PAGES))
     blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
     return [command for block in blocks for command in commands_of(block)]
 
@@ -135,6 +139,18 @@ def test_files_that_contributing_names_exist():
     assert "server/synthesis" in named
     for name in named:
         assert (ROOT / name).exists(), name
+
+
+def test_first_calls_are_those_of_the_clients_pages():
+    pages = [(ROOT / "client" / name / "README.md").read_text() for name in ("python", "web", "godot", "unity")]
+    blocks = [
+        block
+        for part in OPENED.findall((ROOT / "README.md").read_text())
+        for block in re.findall(r"^```(?!rust)\w+\n.*?^```$", part, flags=re.MULTILINE | re.DOTALL)
+    ]
+    assert len(blocks) >= 7
+    for block in blocks:
+        assert any(block in page for page in pages), block
 
 
 def test_the_page_of_errors_lists_every_reason_once():
