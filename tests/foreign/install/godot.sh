@@ -3,10 +3,16 @@
 install_godot() {
     local folder=$PWD/target/foreign/godot
     local keys=/usr/share/keyrings/debian-archive-keyring.gpg
-    local package machine
+    local mirror package machine
     if [ ! -x "$folder/godot" ]; then
         if ! command -v apt-get > /dev/null || [ ! -e "$keys" ]; then
             echo 'SKIPPED: Godot: this is not Debian'
+            return
+        fi
+        # The mirror that this machine uses.
+        mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | grep --max-count=1 '/debian/$' || true)
+        if [ -z "$mirror" ]; then
+            echo 'SKIPPED: Godot: apt has no list of Debian'
             return
         fi
         rm -rf "$folder"
