@@ -10,7 +10,8 @@ install_godot() {
             return
         fi
         # The mirror that this machine uses.
-        mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | grep --max-count=1 '/debian/$' || true)
+        find_mirror() { apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | grep --max-count=1 '/debian/$'; }
+        mirror=$(find_mirror || { apt-get update -qq && find_mirror; } || true)
         if [ -z "$mirror" ]; then
             echo 'SKIPPED: Godot: apt has no list of Debian'
             return
