@@ -20,7 +20,9 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 
 /// A layer that answers GET and HEAD of `/` with the page.
 pub(crate) fn viewer() -> Around<Viewer> {
     let hash = Sha256::digest(PAGE);
-    let start = hash[..].first_chunk().map_or(0, |start| u64::from_be_bytes(*start));
+    let start = hash[..]
+        .first_chunk()
+        .map_or(0, |start| u64::from_be_bytes(*start));
     Around(Viewer {
         etag: HeaderValue::try_from(format!("\"{start:016x}\"")).unwrap_or(HeaderValue::from_static("\"\"")),
     })
