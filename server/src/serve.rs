@@ -379,10 +379,8 @@ impl Server {
             stop.cancel();
             let drained = tokio::time::timeout(config.drain, handler.calls.closed()).await;
             if drained.is_err() {
-                tracing::warn!(
-                    calls = handler.calls.receiver_count(),
-                    "the drain time has passed; cutting off running calls"
-                );
+                let calls = handler.calls.receiver_count();
+                tracing::warn!(calls, "the drain time has passed; cutting off running calls");
             }
             tokio::time::sleep(LINGER).await;
             // The transport would wait for idle connections and open streams forever.
