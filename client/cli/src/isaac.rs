@@ -1,4 +1,4 @@
-//! Files in the format `isaac_grasp` 1.0, which Isaac Sim's Grasp Editor and GraspGen read and write: grasps of one object by one
+//! Files in the format `isaac_grasp` 1.0, which Isaac Sim's Grasp Editor reads and writes: grasps of one object by one
 //! gripper, here by a hand of a rig.
 
 use std::{fmt, path::Path, str::FromStr};
@@ -98,7 +98,7 @@ impl FromStr for Gripper {
 /// A grasp of a file.
 pub(crate) struct NamedGrasp {
     pub(crate) name: String,
-    /// In OpenXR's axes, with its wrist in the object's frame.
+    /// In the axes of `OpenXR`, with its wrist in the object's frame.
     pub(crate) hand: HandPose,
     /// The score; 0 of a grasp that is not valid.
     pub(crate) confidence: f32,

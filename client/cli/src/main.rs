@@ -137,7 +137,7 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
         Command::Validate(arguments) => Box::pin(validate::run(arguments, output)).await,
         Command::Evaluate(arguments) => Box::pin(evaluate::run(arguments, output)).await,
-        Command::Objects(arguments) => objects::run(arguments, output).await.map(done),
+        Command::Objects(arguments) => Box::pin(objects::run(arguments, output)).await.map(done),
         Command::Rigs(arguments) => rigs::run(arguments, output).await.map(done),
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
         Command::View(arguments) => Box::pin(view::run(arguments, output)).await,

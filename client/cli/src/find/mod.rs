@@ -155,7 +155,7 @@ pub(crate) struct Arguments {
     /// Write the scene as a binary glTF file, if a grasp is found.
     #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
     glb: Option<PathBuf>,
-    /// Write the grasps to a file in the format isaac_grasp 1.0, if one is found; see `grasp objects grips export --help`.
+    /// Write the grasps to a file in the format `isaac_grasp` 1.0, if one is found; see `grasp objects grips export --help`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["print_request", "stream"])]
     isaac: Option<PathBuf>,
     /// The file that the receiving hand's rig was created from, to draw the hand with its own skin.
@@ -207,7 +207,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         arguments.draw(&drawing, &answer.grasps, None).await?;
     }
     arguments
-        .write_isaac(&client, &request.holdout, &answer.grasps)
+        .write_isaac(&client, request.holdout.as_ref(), &answer.grasps)
         .await?;
     output.write_message(&answer, |answer| {
         answer::describe(&request, answer, round_trip_seconds)
@@ -295,7 +295,7 @@ impl Arguments {
     async fn write_isaac(
         &self,
         client: &GraspClient,
-        holdout: &Option<v1::Holdout>,
+        holdout: Option<&v1::Holdout>,
         grasps: &[v1::Grasp],
     ) -> Result<(), Failure> {
         let (Some(path), Some(holdout)) = (&self.isaac, holdout) else {
@@ -341,7 +341,8 @@ impl Arguments {
                 (None, _) => end = Ending::found(message.outcome() == Outcome::Found),
             }
         }
-        self.write_isaac(client, &request.holdout, &grasps).await?;
+        self.write_isaac(client, request.holdout.as_ref(), &grasps)
+            .await?;
         Ok(end)
     }
 

@@ -19,14 +19,14 @@ use crate::{
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Write the preferred grips of one hand to a file in the format isaac_grasp 1.0.
+    /// Write the preferred grips of one hand to a file in the format `isaac_grasp` 1.0.
     ///
     /// A grip's confidence is its score without a giver; 0 if it is not valid.
     ///
-    /// With --json: {"file": PATH, "grips": [{"name", "confidence"}], "left_out": [NAME]}.
+    /// With --json: {"file": PATH, "grips": [{"name", "confidence"}], "omitted": [NAME]}.
     #[command(after_long_help = isaac::ABOUT)]
     Export(Arguments),
-    /// Add the grasps of a file in the format isaac_grasp 1.0 to the preferred grips of an object.
+    /// Add the grasps of a file in the format `isaac_grasp` 1.0 to the preferred grips of an object.
     ///
     /// They are tried in the file's order. A grip that the object has by the same name is replaced.
     ///
@@ -83,7 +83,7 @@ async fn export(client: &GraspClient, arguments: Arguments, output: Output) -> R
         .iter()
         .map(|grasp| json!({ "name": grasp.name, "confidence": grasp.confidence }));
     let grips: Vec<_> = grips.collect();
-    let answer = json!({ "file": arguments.isaac, "grips": grips, "left_out": left_out });
+    let answer = json!({ "file": arguments.isaac, "grips": grips, "omitted": left_out });
     output.write(&answer, |_| written(&arguments.isaac, &grasps, &left_out))
 }
 
@@ -94,7 +94,7 @@ fn written(file: &Path, grasps: &[NamedGrasp], left_out: &[&str]) -> String {
     }
     let mut lines = vec![("file", file.display().to_string())];
     if !left_out.is_empty() {
-        lines.push(("left out", list(left_out)));
+        lines.push(("omitted", list(left_out)));
     }
     format!("{table}\n\n{}", pairs(&lines))
 }

@@ -77,7 +77,7 @@ enum Command {
         /// The object's name: "remote" or "objects/remote".
         name: String,
     },
-    /// Export an object's preferred grips to a file in the format isaac_grasp 1.0, or import them.
+    /// Export an object's preferred grips to a file in the format `isaac_grasp` 1.0, or import them.
     #[command(subcommand)]
     Grips(grips::Command),
 }

@@ -118,7 +118,7 @@ async fn grips_are_exchanged_with_isaac_sim() {
     let export = grips("export mine", &exported);
     let written = export.json();
     let confidence = written["grips"][0]["confidence"].as_f64().unwrap();
-    assert!(confidence > 0.3 && written["left_out"] == json!([]), "{written}");
+    assert!(confidence > 0.3 && written["omitted"] == json!([]), "{written}");
     let text = fs::read_to_string(&exported).unwrap();
     assert_contains(
         &text,
