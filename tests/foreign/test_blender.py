@@ -215,7 +215,7 @@ import bpy
 bpy.ops.preferences.addon_enable(module="bl_pkg")
 bpy.ops.extensions.package_install_files(filepath={archive!r}, repo="user_default", enable_on_install=True)
 bpy.ops.wm.read_homefile(use_empty=True)
-{console.replace("127.0.0.1:50051", address)}
+{console.replace("[::1]:50051", address)}
 assert bpy.context.window_manager.grasp_known[0].name == "from the side"
 assert bpy.data.objects["Grasp receiver right"].animation_data.action
 """

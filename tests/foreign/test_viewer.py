@@ -144,6 +144,13 @@ def test_the_grasp_follows_the_mouse_and_undo_takes_it_back(seen):
 
 
 @needs_packages
+def test_compares_two_versions(seen):
+    before, after, again = seen["compare"]
+    assert before == again and before[1] and after[1]
+    assert after[0] == pytest.approx(0.2, abs=0.011) and abs(before[0] - after[0]) > 0.005
+
+
+@needs_packages
 def test_copies_the_request_as_code_that_runs(seen, tmp_path):
     environment = {**os.environ, "PATH": f"{ROOT / 'tests/foreign/bin'}:{ROOT / 'target/foreign/node_modules/.bin'}:{os.environ['PATH']}"}
     run = subprocess.run(["bash", "-c", seen["code"]["grpcurl"]], env=environment, cwd=ROOT, capture_output=True, text=True, timeout=60)

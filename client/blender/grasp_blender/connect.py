@@ -24,7 +24,7 @@ class GraspError(Exception):
 
 
 class Client:
-    """A server at an address such as "http://127.0.0.1:50051"; each call ends within `timeout` seconds."""
+    """A server at an address such as "http://[::1]:50051"; each call ends within `timeout` seconds."""
 
     def __init__(self, address, timeout=10.0):
         self.address = (address if "://" in address else f"http://{address}").rstrip("/")

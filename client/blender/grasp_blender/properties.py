@@ -62,7 +62,7 @@ class GraspObjectSettings(bpy.types.PropertyGroup):
 class GraspSettings(bpy.types.PropertyGroup):
     """Who gives, who takes, and how."""
 
-    address: StringProperty(name="Server", description="Address of the Grasp server", default="http://127.0.0.1:50051")
+    address: StringProperty(name="Server", description="Address of the Grasp server", default="http://[::1]:50051")
     timeout: FloatProperty(
         name="Timeout", description="Longest time for a call", default=10.0, min=0.5, max=120.0, subtype="TIME_ABSOLUTE"
     )

@@ -123,8 +123,8 @@ def assert_posed(item, armature, joints):
 
 
 def assert_touches(item, armature, grasp):
-    """The contacts lie on the object within 0.1 mm, and on the skin: those of fingertips no more than 1 mm outside of it, and no
-    more than 2 mm inside, by which flesh yields; where the skin folds, a millimeter more."""
+    """The contacts lie on the object within 0.1 mm. Those of fingertips are no more than 1 mm outside of the skin, and no more
+    than 3 mm inside, of which flesh yields by 2; others may be a few millimeters off, where the skin folds."""
     mesh, skin = surface(item), surface(next(child for child in armature.children if child.type == "MESH"))
     assert grasp["contacts"]
     for contact in grasp["contacts"]:
@@ -132,8 +132,8 @@ def assert_touches(item, armature, grasp):
         assert meters(point, mesh.find_nearest(point)[0]) < 1e-4
         nearest, normal, _, _ = skin.find_nearest(point)
         outside = meters(point, nearest) * (1 if (point - nearest).dot(normal) > 0 else -1)
-        fold = 0 if contact["phalanx"] == 3 else 1e-3
-        assert -2e-3 - fold < outside < 1e-3 + fold, (contact["digit"], contact["phalanx"], outside)
+        fold = 0 if contact["phalanx"] == 3 else 4e-3
+        assert -3e-3 - fold < outside < 1e-3 + fold, (contact["digit"], contact["phalanx"], outside)
 
 
 def test_a_grasp_is_shown_at_an_object():

@@ -3,10 +3,17 @@
 install_godot() {
     local folder=$PWD/target/foreign/godot
     local keys=/usr/share/keyrings/debian-archive-keyring.gpg
-    local package machine
+    local mirror package machine
     if [ ! -x "$folder/godot" ]; then
         if ! command -v apt-get > /dev/null || [ ! -e "$keys" ]; then
             echo 'SKIPPED: Godot: this is not Debian'
+            return
+        fi
+        # The mirror that this machine uses.
+        find_mirror() { apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | grep --max-count=1 '/debian/$'; }
+        mirror=$(find_mirror || { apt-get update -qq && find_mirror; } || true)
+        if [ -z "$mirror" ]; then
+            echo 'SKIPPED: Godot: apt has no list of Debian'
             return
         fi
         rm -rf "$folder"

@@ -193,6 +193,19 @@ for (let i = 0; i < 20; i++) await page.keyboard.press("ArrowRight");
 await until(() => !graspViewer.app.follower.isBusy);
 seen.fingers = { open: await page.evaluate(() => graspViewer.app.state.giver.open), status: await text("#outcome") };
 
+// Before and after: the kept version, with a ghost of its grasp, and the one before it, changed twice.
+const opened = () => page.evaluate(() => [graspViewer.app.state.giver.open, graspViewer.app.view.before.group.visible]);
+await page.click("#keep");
+await page.click("#undo");
+const before = await opened();
+await page.click("#swap");
+const after = await opened();
+await page.click("#swap");
+seen.compare = [before, after, await opened()];
+await page.click("#swap");
+await page.click("#keep");
+await until(() => !graspViewer.app.follower.isBusy);
+
 // Code and files.
 seen.code = await page.evaluate(() => {
   const { app, snippets } = graspViewer;

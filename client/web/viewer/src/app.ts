@@ -40,6 +40,8 @@ export class App {
   readonly onObject: (() => void)[] = [];
   /** Milliseconds from opening the page to the first grasp on the screen. */
   firstGraspMs: number | null = null;
+  /** The last search. */
+  finding: Promise<void> = Promise.resolve();
   private searches = 0;
   private shownObject = "";
   /** The scene is new: the camera looks at it once object and answer are there. */
@@ -176,7 +178,7 @@ export class App {
   private changed(change: Change): void {
     this.view.showState(this.state);
     if (this.state.object !== this.shownObject) void this.showObject();
-    if (change === "find") void this.find();
+    if (change === "find") this.finding = this.find();
     else this.follow();
     this.gizmos.place();
     this.onState.forEach((show) => show());

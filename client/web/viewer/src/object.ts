@@ -35,8 +35,20 @@ export function meshOf(name: string, etag: string): Promise<ObjectMesh> {
   return mesh;
 }
 
+const ahead = new Map<string, Promise<Uint8Array<ArrayBuffer>>>();
+
+/** Fetches a mesh that will be wanted once the object's state is known. */
+export function fetchAhead(name: string): void {
+  const mesh = api.mesh(name);
+  // Handled where it is awaited.
+  mesh.catch(() => undefined);
+  ahead.set(name, mesh);
+}
+
 async function load(name: string): Promise<ObjectMesh> {
-  const glb = await api.mesh(name);
+  const fetched = ahead.get(name) ?? api.mesh(name);
+  ahead.delete(name);
+  const glb = await fetched;
   const gltf = await new GLTFLoader().parseAsync(glb.buffer, "");
   const parts: BufferGeometry[] = [];
   const forbidden: number[] = [];

@@ -2,7 +2,7 @@
 import type { FindGraspResponse } from "#contract/grasp_service_pb";
 import type { GraspObject } from "#contract/object_service_pb";
 import * as api from "./api";
-import { meshOf } from "./object";
+import { fetchAhead } from "./object";
 import { Rigs } from "./rigs";
 import { findRequest, fromHash, HOLDOUTS, type State } from "./state";
 
@@ -22,10 +22,7 @@ export class Opening {
     this.objects = api.allObjects();
     // Only fingers that were opened or closed need the rig.
     this.found = (this.state.giver?.open ?? 0) === 0 ? this.find() : this.rigsLoaded.then(() => this.find());
-    void this.objects.then((all) => {
-      const object = all.find(({ name }) => name === this.state.object);
-      if (object) void meshOf(object.name, object.etag);
-    });
+    fetchAhead(this.state.object);
     // Handled where they are awaited.
     for (const call of [this.objects, this.rigsLoaded, this.found]) call.catch(() => undefined);
   }

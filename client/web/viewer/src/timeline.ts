@@ -68,7 +68,8 @@ export class Timeline {
       this.recording = { name, object, frames: sound };
       this.at = 0;
       this.show();
-      this.toggle();
+      // Frames hold on to the first grasp.
+      void this.app.finding.then(() => this.recording?.name === name && this.toggle());
     } catch (error) {
       toast(`${name} is not a recording: ${error instanceof Error ? error.message : String(error)}`, "bad");
     }
