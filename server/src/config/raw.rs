@@ -12,7 +12,7 @@ use clap::{
     builder::{OsStringValueParser, TypedValueParser},
 };
 use grasp_assets::hands::RIG_NAMES;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Config, ConfigError, LogFormat, StorePlace};
 use crate::{
@@ -33,7 +33,7 @@ pub struct RawConfig {
     ///
     /// The socket of a path is private to the server's user. All addresses share the limits.
     #[arg(long, env = "GRASP_LISTEN", value_name = "ADDRESS", value_delimiter = ',')]
-    #[serde(deserialize_with = "one_or_more")]
+    #[serde(deserialize_with = "one_or_more", serialize_with = "joined")]
     pub listen: Option<Vec<String>>,
     /// Search threads [default: one per core].
     #[arg(long, env = "GRASP_WORKERS", value_name = "COUNT")]
@@ -177,6 +177,11 @@ fn one_or_more<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<String
         Texts::One(text) => text.split(',').map(str::to_owned).collect(),
         Texts::More(texts) => texts,
     }))
+}
+
+#[allow(clippy::ref_option, reason = "serde passes the field itself")]
+fn joined<S: Serializer>(texts: &Option<Vec<String>>, writer: S) -> Result<S::Ok, S::Error> {
+    texts.as_ref().map(|texts| texts.join(",")).serialize(writer)
 }
 
 /// Reads a configuration file.

@@ -336,3 +336,51 @@ fn written(call: &Call, messages: Bytes) -> Result<Bytes, ServiceError> {
     }
     Ok(frames.freeze())
 }
+
+#[cfg(test)]
+mod tests {
+    use http_body_util::{BodyExt as _, StreamBody};
+
+    use super::{
+        super::{Format, methods::method},
+        *,
+    };
+
+    #[tokio::test]
+    async fn envelopes_are_read_in_pieces_of_any_size() {
+        let call = Call {
+            format: Format {
+                json: true,
+                enveloped: true,
+            },
+            method: method("/grasp.v1.GraspService/TrackHoldout").unwrap(),
+            packed: false,
+        };
+        let texts = [
+            r#"{"frame": {"sequence": "1"}}"#,
+            "{}",
+            r#"{"frame": {"committed": true}}"#,
+        ];
+        let sent = texts.map(|text| framed(text.as_bytes())).concat();
+        let expected = [&[0x12, 2, 0x10, 1][..], &[], &[0x12, 2, 0x38, 1]]
+            .map(framed)
+            .concat();
+        for size in (1..=12).chain([sent.len()]) {
+            let pieces: Vec<_> = sent
+                .chunks(size)
+                .map(|piece| Ok::<_, Status>(Frame::data(Bytes::copy_from_slice(piece))))
+                .collect();
+            let reader = Reader {
+                call: call.clone(),
+                limit: 100,
+                buffer: BytesMut::new(),
+                ended: false,
+                taken: false,
+                turning: Turning::new(&Arc::new(Semaphore::new(0))),
+            };
+            let body = Body::new(StreamBody::new(tokio_stream::iter(pieces)));
+            let read = filtered(body, reader).collect().await.unwrap().to_bytes();
+            assert_eq!(read, expected, "pieces of {size}");
+        }
+    }
+}
