@@ -173,6 +173,8 @@ def test_downloads_the_scene_and_the_grasp(seen):
     assert {"object", "giver", "receiver", "giver-skin", "receiver-skin"} <= set(seen["scene"]["names"])
     lines = seen["isaac"].splitlines()
     assert lines[:2] == ["format: isaac_grasp", "format_version: 1.0"]
+    # As the command line reads it.
+    assert any(re.fullmatch(r"gripper_frame: rigs/adult/(left|right)", line) for line in lines)
     orientation = next(line for line in lines if "orientation:" in line)
     w, x, y, z = (float(value) for value in re.findall(r"-?\d+\.\d+", orientation))
     assert w * w + x * x + y * y + z * z == pytest.approx(1, abs=1e-4)

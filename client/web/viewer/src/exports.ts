@@ -4,7 +4,7 @@ import { BufferGeometry, Color, Float32BufferAttribute, Group, Mesh, MeshStandar
 import { GLTFExporter } from "three/addons/exporters/GLTFExporter.js";
 
 import { GraspSchema, type Grasp, KeyFrameKind } from "#contract/grasp_pb";
-import type { HandPose } from "#contract/holdout_pb";
+import { type HandPose, Handedness } from "#contract/holdout_pb";
 import type { App } from "./app";
 import { download, toast } from "./dom";
 import { DIGIT_NAMES, digitsOf } from "./kinematics";
@@ -76,6 +76,12 @@ function joints(hand: HandPose): string {
   }).join("\n");
 }
 
+/** A hand as the command line names it: rigs/adult/left, and its size if it is not the rig's. */
+function gripperName({ rig, handedness, scale }: HandPose): string {
+  const side = handedness === Handedness.LEFT ? "left" : "right";
+  return [rig, side, ...(scale === undefined ? [] : [scale])].join("/");
+}
+
 /** Grasps in the format isaac_grasp 1.0 of Isaac Sim's Grasp Editor. */
 export function isaacGrasps(grasps: Grasp[]): string {
   const [first] = grasps;
@@ -96,7 +102,7 @@ export function isaacGrasps(grasps: Grasp[]): string {
       joints(open),
     ];
   });
-  const gripper = first?.hand ? `${first.hand.rig.replace("rigs/", "")}_${first.hand.handedness === 1 ? "left" : "right"}_wrist` : "wrist";
+  const gripper = first?.hand ? gripperName(first.hand) : "";
   return ["format: isaac_grasp", "format_version: 1.0", "", "object_frame: object", `gripper_frame: ${gripper}`, "", "grasps:", ...lines, ""].join("\n");
 }
 
