@@ -119,7 +119,7 @@ async fn usage_errors_exit_with_2_without_a_server() {
         (grasp(""), "Usage"),
         (
             input(r#"{"holdout": {"objekt": ""}}"#),
-            "holdout: unrecognized field name 'objekt'",
+            "holdout.objekt: is no field of Holdout; it has object,",
         ),
         (input("{\n\"holdout\": {},\n}"), "line 3"),
         (
