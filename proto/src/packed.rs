@@ -54,7 +54,7 @@ impl v1::Grasp {
         let right = u8::from(hand.handedness() == v1::Handedness::Right);
         let present = (0..5).fold(right, |bits, i| bits | u8::from(digits[i].is_some()) << (i + 1));
         // The palm, 0 in the contract, comes after the digits.
-        let bit = |contact: &v1::Contact| 1 << (contact.digit + 5) % 6;
+        let bit = |contact: &v1::Contact| 1 << ((contact.digit + 5) % 6);
         let touching = self.contacts.iter().fold(0, |bits, contact| bits | bit(contact));
         let scale = (hand.size() * 100.0).round() as u8;
         let wrist = hand.object_from_wrist.unwrap_or_default();
