@@ -81,7 +81,7 @@ impl<B> Middleware<B> for Connect {
             }
             Err(refusal) => {
                 tracing::debug!(path = head.uri.path(), status = %refusal.status(), "refused a request");
-                Box::pin(std::future::ready(Ok(refusal)))
+                Box::pin(std::future::ready(Ok(*refusal)))
             }
         }
     }

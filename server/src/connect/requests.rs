@@ -23,6 +23,9 @@ const MAX_GRPC_MILLIS: u64 = 99_999_999;
 /// Headers of gRPC, which only the layers of this module set.
 const OF_GRPC: [&str; 3] = ["grpc-timeout", "grpc-encoding", "grpc-accept-encoding"];
 
+/// The answer to a request that is refused.
+type Refusal = Box<Response<Body>>;
+
 /// A call, for the layer that turns its messages.
 #[derive(Clone, Debug)]
 pub(super) struct Call {
@@ -41,9 +44,9 @@ pub(super) fn format(headers: &HeaderMap) -> Option<Format> {
 ///
 /// # Errors
 /// The answer to a request that is refused.
-pub(super) fn call(head: &mut Parts, format: Format) -> Result<Call, Response<Body>> {
+pub(super) fn call(head: &mut Parts, format: Format) -> Result<Call, Refusal> {
     let method = called(head, format)?;
-    let failed = |error: ServiceError| failure(&error.into(), format);
+    let failed = |error: ServiceError| Box::new(failure(&error.into(), format));
     let headers = &mut head.headers;
     for name in OF_GRPC {
         headers.remove(name);
@@ -73,7 +76,7 @@ pub(super) fn call(head: &mut Parts, format: Format) -> Result<Call, Response<Bo
         Some(given) if given == "identity" || given.is_empty() => false,
         Some(given) => {
             let problem = format!("{encoding} is {}; it must be gzip or identity", shown(&given));
-            return Err(failure(&Status::unimplemented(problem), format));
+            return Err(Box::new(failure(&Status::unimplemented(problem), format)));
         }
     };
     let accepts = match headers.remove(&accepted) {
@@ -93,15 +96,15 @@ pub(super) fn call(head: &mut Parts, format: Format) -> Result<Call, Response<Bo
 }
 
 /// The method that a request calls.
-fn called(head: &Parts, format: Format) -> Result<&'static Method, Response<Body>> {
+fn called(head: &Parts, format: Format) -> Result<&'static Method, Refusal> {
     let path = head.uri.path();
     let Some(method) = method(path) else {
-        let mut problem = format!("{} is no method of this server", quoted(path));
-        let like = named_like(path);
-        if !like.is_empty() {
-            problem += &format!("; it has {}", like.join(", "));
-        }
-        return Err(failure(&Status::unimplemented(problem), format));
+        let like = match named_like(path).join(", ") {
+            like if like.is_empty() => like,
+            like => format!("; it has {like}"),
+        };
+        let problem = format!("{} is no method of this server{like}", quoted(path));
+        return Err(Box::new(failure(&Status::unimplemented(problem), format)));
     };
     let streams = method.is_client_streaming() || method.is_server_streaming();
     if streams != format.enveloped {
@@ -117,7 +120,7 @@ fn called(head: &Parts, format: Format) -> Result<&'static Method, Response<Body
             right.content_type()
         );
         let status = Status::unimplemented(problem);
-        return Err(refusal(StatusCode::UNSUPPORTED_MEDIA_TYPE, &status));
+        return Err(Box::new(refusal(StatusCode::UNSUPPORTED_MEDIA_TYPE, &status)));
     }
     let both_ways = method.is_client_streaming() && method.is_server_streaming();
     if both_ways && head.version != Version::HTTP_2 {
@@ -127,7 +130,7 @@ fn called(head: &Parts, format: Format) -> Result<&'static Method, Response<Body
             head.version
         );
         let status = Status::unimplemented(problem);
-        return Err(refusal(StatusCode::HTTP_VERSION_NOT_SUPPORTED, &status));
+        return Err(Box::new(refusal(StatusCode::HTTP_VERSION_NOT_SUPPORTED, &status)));
     }
     Ok(method)
 }

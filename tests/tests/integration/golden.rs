@@ -175,7 +175,7 @@ async fn golden_grasps_are_as_recorded_and_unpack_to_the_same_hand() {
     let server = TestServer::start().await;
     let mut vectors = Vec::new();
     for (place, holdout) in holdouts().iter().enumerate() {
-        vectors.extend(vector(&server, &holdout.name, request(place, holdout)).await);
+        vectors.extend(Box::pin(vector(&server, &holdout.name, request(place, holdout))).await);
     }
     vectors.truncate(COUNT);
     assert_eq!(vectors.len(), COUNT, "too few holdouts have a grasp");
