@@ -92,6 +92,8 @@ async function track() {
       );
     }
   }
+  // The last frame may be answered by now.
+  tracker.push({ holdout: { clientFromObject: object(59) } });
   await answered();
   // After the change of grasp has been shown, the hand is at the object, wherever that is.
   await pause(200);
