@@ -43,8 +43,13 @@ func run() -> void:
 	expect(track != null and track.name != "", "a track: %s" % (track.error if track else null))
 	if not track or not track.name:
 		return
+	var answers: Array[GraspTrack.Answer] = []
+	track.answered.connect(answers.append)
 	track.push({"holdout": scene.holdout_now(object)})
-	var answer: GraspTrack.Answer = await track.answered
-	print(answer.status, " ", answer.warnings)
-	expect(answer.status in ["KEPT", "ADJUSTED", "REPLANNED"], "a frame is answered")
+	while answers.is_empty() and track.error == null:
+		await process_frame
+	expect(track.error == null, "the frame is answered: %s" % track.error)
+	if answers:
+		print(answers[0].status, " ", answers[0].warnings)
+		expect(answers[0].status in ["KEPT", "ADJUSTED", "REPLANNED"], "with a grasp")
 	await track.close()
