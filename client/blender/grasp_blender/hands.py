@@ -72,7 +72,7 @@ def _show(armature, shown):
 
 
 def _imported(context, file):
-    """The armature and the skin in a file; what was selected stays so."""
+    """The armature and the skin in a file; the selection stays."""
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")

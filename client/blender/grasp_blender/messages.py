@@ -1,4 +1,4 @@
-"""Parts of messages as JSON, which leaves out zeros and what is absent, and answers in one form: OpenXR's axes, all in the
+"""Parts of messages as JSON, without zeros and absent fields, and answers in one form: OpenXR's axes, all in the
 object's frame."""
 
 from . import axes

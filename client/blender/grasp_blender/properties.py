@@ -1,4 +1,4 @@
-"""What the panel asks for, and what it shows."""
+"""Settings of the panel, and the results that it shows."""
 
 import bpy
 from bpy.props import (

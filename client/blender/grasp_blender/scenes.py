@@ -1,4 +1,4 @@
-"""Places of things in Blender's scene: meshes as the server gets them, and what is shown at an object."""
+"""Places of things in Blender's scene: meshes as the server gets them, and the markers at an object."""
 
 import bpy
 import numpy

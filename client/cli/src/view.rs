@@ -16,7 +16,7 @@ const ABOUT: &str = "\
 Show objects, hands and grasps in a browser.
 
 A server starts inside this process, on the loopback interface, and runs until it is interrupted. It prints the address of its
-page, and opens it. Other clients may call it, too. What is created is kept in memory.
+page, and opens it. Other clients may call it, too. Created objects and rigs are kept in memory.
 
 With --json: {\"url\": …}.";
 

@@ -51,7 +51,7 @@ export async function downloadMesh({ objects }: GraspClient, name: string): Prom
   return new Uint8Array(await new Blob(pieces).arrayBuffer());
 }
 
-/** The wrong fields that an error names, each with what is wrong with it; empty for other errors. */
+/** The violations of an error: fields, each with its fault; empty for other errors. */
 export function violations(error: unknown): BadRequest_FieldViolation[] {
   return ConnectError.from(error)
     .findDetails(BadRequestSchema)

@@ -94,7 +94,7 @@ export function inverse(aFromB: Rigid): Rigid {
   return { position: scale(turned(back, aFromB.position), -1), orientation: back };
 }
 
-/** A message's transform: what it does not set is the identity's. */
+/** A message's transform; absent parts are the identity's. */
 export function rigid(pose: Pose | undefined): Rigid {
   return { position: pose?.position ?? ORIGIN, orientation: pose?.orientation ?? NO_TURN };
 }

@@ -100,7 +100,7 @@ export class GraspTracker {
           this.next ??= frame;
         } else {
           this.events.onError?.(error);
-          // A server that is away or busy is not asked for every picture.
+          // A server that is away or busy is not called for every picture.
           await new Promise((done) => setTimeout(done, retryDelay(error) ?? PAUSE));
         }
       }

@@ -33,7 +33,7 @@ class Grasp:
 
     @property
     def score(self) -> float | None:
-        """The score, from 0 to 1; None if it was not rated."""
+        """The score, from 0 to 1, or None if it was not rated."""
         return self.message.score if self.message.HasField("score") else None
 
     @property

@@ -12,7 +12,7 @@ import { quaternion, vector } from "./poses";
 import { requestJson } from "./snippets";
 import { objectName } from "./words";
 
-/** What of the stage is drawn, with skins as they are posed, so that every viewer shows them alike. */
+/** The drawn parts of the stage, with skins as they are posed, so that every viewer shows them alike. */
 export async function sceneGlb(app: App): Promise<ArrayBuffer> {
   const scene = new Scene();
   const { view } = app;

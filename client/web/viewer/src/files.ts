@@ -112,7 +112,7 @@ export class Files {
     this.report(object);
   }
 
-  /** What is odd about an object; a wrong unit can be changed. */
+  /** Oddities of an object; a wrong unit can be changed. */
   private report(object: GraspObject): void {
     const size = object.boundingBox?.halfExtents;
     const edges = size ? [size.x, size.y, size.z].map((half) => `${(200 * half).toPrecision(3)}`).join(" × ") : "?";

@@ -39,7 +39,7 @@ showPanels(app, {
   addFile: () => files.choose(),
 });
 
-// A click, not a drag, selects what is under it.
+// A click, not a drag, selects the thing under it.
 let down: Vector2 | null = null;
 canvas.addEventListener("pointerdown", (event) => (down = new Vector2(event.clientX, event.clientY)));
 canvas.addEventListener("pointerup", (event) => {
