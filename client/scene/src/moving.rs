@@ -11,8 +11,8 @@ use crate::{
     render::{Stage, ViewSize, render},
 };
 
-/// Pictures per second: as animations in pages are usual.
-const RATE: f32 = 15.0;
+/// Pictures per second: enough for a page, which has to load them.
+const RATE: f32 = 10.0;
 
 /// Moments that the camera frames together.
 const FRAMED: usize = 6;
@@ -66,12 +66,12 @@ mod tests {
     fn each_picture_shows_the_last_moment_before_it() {
         let times: Vec<f32> = (0..=90).map(|frame| frame as f32 / 90.0).collect();
         let moments = moments(&times);
-        assert_eq!(moments.len(), 16);
+        assert_eq!(moments.len(), 11);
         assert!(
             moments
                 .iter()
                 .zip(0..)
-                .all(|(&moment, picture)| moment.abs_diff(6 * picture) <= 1)
+                .all(|(&moment, picture)| moment.abs_diff(9 * picture) <= 1)
         );
     }
 }

@@ -38,8 +38,8 @@ const LAST_ANSWER: Duration = Duration::from_secs(2);
 
 /// Size of a moving picture: it fits into a page.
 const PICTURE: ViewSize = ViewSize {
-    width: 480,
-    height: 320,
+    width: 384,
+    height: 256,
 };
 
 /// The long help: the shape of a motion as JSON.
@@ -91,7 +91,7 @@ pub(crate) struct Arguments {
     /// Write the motion as a binary glTF file with an animation.
     #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
     glb: Option<PathBuf>,
-    /// Write the motion as an animated PNG file, 15 pictures per second.
+    /// Write the motion as an animated PNG file, 10 pictures per second.
     #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
     png: Option<PathBuf>,
     #[command(flatten)]
