@@ -40,7 +40,7 @@ impl ListenAddress {
         0,
     )));
 
-    /// The default of machines without IPv6.
+    /// The other address of the loopback interface, the only one without IPv6.
     pub const DEFAULT_V4: Self = Self::Tcp(SocketAddr::V4(std::net::SocketAddrV4::new(
         Ipv4Addr::LOCALHOST,
         DEFAULT_PORT,
@@ -85,24 +85,43 @@ impl From<TcpListener> for Listener {
 }
 
 impl Listener {
-    /// Listens on an address. In place of the default address on a machine without IPv6, on that of IPv4.
+    /// Listens on addresses. The default alone means the loopback interface: 127.0.0.1 as well, where `localhost` may be, or only
+    /// that without IPv6.
+    ///
+    /// # Errors
+    /// As of [`Self::bind`], with the address.
+    pub async fn bind_all(addresses: &[ListenAddress]) -> Result<Vec<Self>, (ListenAddress, io::Error)> {
+        let mut listeners = Vec::new();
+        let is_default = addresses == [ListenAddress::DEFAULT];
+        for address in addresses {
+            match Self::bind(address).await {
+                Ok(listener) => listeners.push(listener),
+                Err(error)
+                    if is_default && error.raw_os_error().is_some_and(|code| NO_IPV6.contains(&code)) =>
+                {
+                    tracing::warn!(%error, "this machine has no IPv6; listening on 127.0.0.1 instead");
+                }
+                Err(error) => return Err((address.clone(), error)),
+            }
+        }
+        if is_default {
+            match Self::bind(&ListenAddress::DEFAULT_V4).await {
+                Ok(listener) => listeners.push(listener),
+                Err(error) if listeners.is_empty() => return Err((ListenAddress::DEFAULT_V4, error)),
+                Err(error) => tracing::warn!(%error, "cannot listen on 127.0.0.1 as well"),
+            }
+        }
+        Ok(listeners)
+    }
+
+    /// Listens on an address.
     ///
     /// # Errors
     /// The address is in use, or is none of this machine's; or the path is no socket, or cannot be created.
     pub async fn bind(address: &ListenAddress) -> io::Result<Self> {
         match address {
             ListenAddress::Unix(path) => SocketFile::bind(path),
-            ListenAddress::Tcp(tcp) => match TcpListener::bind(tcp).await {
-                Err(error)
-                    if *address == ListenAddress::DEFAULT
-                        && error.raw_os_error().is_some_and(|code| NO_IPV6.contains(&code)) =>
-                {
-                    tracing::warn!(%error, "this machine has no IPv6; listening on 127.0.0.1 instead");
-                    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, DEFAULT_PORT)).await?;
-                    Ok(listener.into())
-                }
-                listener => Ok(listener?.into()),
-            },
+            ListenAddress::Tcp(tcp) => Ok(TcpListener::bind(tcp).await?.into()),
         }
     }
 

@@ -147,11 +147,8 @@ fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error::Error>> {
-    let mut listeners = Vec::new();
-    for address in &config.listen {
-        let listener = Listener::bind(address).await;
-        listeners.push(listener.map_err(|error| format!("cannot listen on {address}: {error}"))?);
-    }
+    let listeners = Listener::bind_all(&config.listen).await;
+    let listeners = listeners.map_err(|(address, error)| format!("cannot listen on {address}: {error}"))?;
     // Before logging that the server is there: from now on, signals start the drain.
     let kinds = [
         SignalKind::terminate(),

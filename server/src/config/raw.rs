@@ -29,7 +29,7 @@ const VARIABLE_PREFIX: &str = "GRASP_";
 #[serde(deny_unknown_fields, default)]
 pub struct RawConfig {
     /// Addresses to listen on, separated by commas or each with a flag of its own: an address with a port, or `unix:/PATH`
-    /// [default: `[::1]:50051`, or `127.0.0.1:50051` without IPv6].
+    /// [default: `[::1]:50051`, and `127.0.0.1:50051` as well].
     ///
     /// The socket of a path is private to the server's user. All addresses share the limits.
     #[arg(long, env = "GRASP_LISTEN", value_name = "ADDRESS", value_delimiter = ',')]
