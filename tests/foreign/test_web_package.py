@@ -230,6 +230,7 @@ def test_an_avatar_takes_an_object(show, version):
     assert max(links.values()) < 1e-3, links
     touching = contact_distances(seen["answer"]["grasps"][0], seen["bones"])
     assert len(touching) > 1
-    assert all(distance < 0.004 for distance in touching), touching
+    # Flesh yields by 2 mm, and between joints the skin is up to some millimetres off the straight line that is measured here.
+    assert all(distance < 0.006 for distance in touching), touching
     # The file's tips are inside the skin, on which the rig's are.
     assert max(apart[joint] for joint in apart if "tip" in joint) < 7e-3, apart
