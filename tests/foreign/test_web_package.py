@@ -3,6 +3,7 @@
 import base64
 import http.server
 import json
+import math
 import os
 import pathlib
 import queue
@@ -195,6 +196,11 @@ def contact_distances(grasp, bones):
         start, end = [bones[f"right-{name}"] for name in names]
         radii = [hand["joints"][JOINTS.index(name)]["radius"] for name in names]
         along = [b - a for a, b in zip(start, end)]
+        if names[1].endswith("tip"):
+            # The fingertip is rounded about a point a radius before the skin, on which the rig's tip is; the file's is inside.
+            first, tip = [hand["joints"][JOINTS.index(name)]["pose"]["position"] for name in names]
+            length = math.dist(*[[place.get(axis, 0) for axis in "xyz"] for place in (first, tip)]) - radii[1]
+            along = [length * d / math.hypot(*along) for d in along]
         share = sum(d * (p - a) for d, p, a in zip(along, point, start)) / sum(d * d for d in along)
         share = min(1, max(0, share))
         near = [a + share * d for a, d in zip(start, along)]
@@ -230,7 +236,7 @@ def test_an_avatar_takes_an_object(show, version):
     assert max(links.values()) < 1e-3, links
     touching = contact_distances(seen["answer"]["grasps"][0], seen["bones"])
     assert len(touching) > 1
-    # Flesh yields by 2 mm, and between joints the skin is up to some millimetres off the straight line that is measured here.
-    assert all(distance < 0.006 for distance in touching), touching
+    # Flesh yields by up to 2 mm.
+    assert all(distance < 0.0025 for distance in touching), touching
     # The file's tips are inside the skin, on which the rig's are.
     assert max(apart[joint] for joint in apart if "tip" in joint) < 7e-3, apart
