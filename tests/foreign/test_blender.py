@@ -200,7 +200,8 @@ def ended_well(arguments, **environment):
 
 
 def test_the_add_on_in_blender(address, bpy_python):
-    tests = [bpy_python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--show-capture=no", "tests/foreign/blender/headless.py"]
+    files = [f"tests/foreign/blender/{name}.py" for name in ("headless", "headless_hands")]
+    tests = [bpy_python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--show-capture=no", *files]
     print(ended_well(tests, GRASP_ADDRESS=address, PYTHONDONTWRITEBYTECODE="1"))
 
 
