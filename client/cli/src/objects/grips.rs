@@ -23,7 +23,7 @@ pub(super) enum Command {
     ///
     /// A grip's confidence is its score without a giver; 0 if it is not valid.
     ///
-    /// With --json: {"file": PATH, "grips": [{"name", "confidence"}], "omitted": ["name"]}.
+    /// With --json: {"file": PATH, "grips": [{"name", "confidence"}], "omitted": […]} with the names of grips left out.
     #[command(after_long_help = isaac::ABOUT)]
     Export(Arguments),
     /// Add the grasps of a file in the format `isaac_grasp` 1.0 to the preferred grips of an object.
