@@ -10,11 +10,10 @@ use std::{
 
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     error::{Limit, ServiceError},
-    limits::Places,
+    limits::{Place, Places},
 };
 
 /// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond
@@ -32,7 +31,7 @@ pub(crate) struct SearchExecutor {
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
-pub(crate) type Admission = OwnedSemaphorePermit;
+pub(crate) type Admission = Place;
 
 impl SearchExecutor {
     /// A pool of `workers` threads that admits up to `maximum` jobs.
@@ -115,22 +114,23 @@ mod tests {
     use std::thread;
 
     use super::*;
+    use crate::client::Client;
 
     #[tokio::test]
     async fn panic_in_a_worker_ends_only_its_own_job() {
-        let executor = SearchExecutor::new(2, 4).expect("threads start");
+        let executor = SearchExecutor::new(2, 8).expect("threads start");
         for _ in 0..8 {
-            let bad = executor.run(executor.places.take().unwrap(), |pool, _| {
+            let bad = executor.run(executor.places.take(&Client::Local).unwrap(), |pool, _| {
                 pool.in_place_scope(|scope| {
                     scope.spawn(|_| panic!("on purpose"));
                     scope.spawn(|_| {});
                 });
             });
-            let good = executor.run(executor.places.take().unwrap(), |_, _| 7);
+            let good = executor.run(executor.places.take(&Client::Local).unwrap(), |_, _| 7);
             assert_eq!(tokio::join!(bad, good), (Err(ServiceError::Panicked), Ok(7)));
         }
         let threads = executor
-            .run(executor.places.take().unwrap(), |pool, _| {
+            .run(executor.places.take(&Client::Local).unwrap(), |pool, _| {
                 pool.broadcast(|_| thread::current().name().map(str::to_owned))
             })
             .await

@@ -18,6 +18,7 @@ use super::{
 };
 use crate::{
     budget::{DeadlineReserve, parse_grpc_timeout},
+    client::Client,
     error::{ServiceError, blame_client},
     limits::{MAX_FIND_REQUEST, Places},
     middleware::{Answer, Middleware},
@@ -95,16 +96,19 @@ impl Middleware<Body> for Calls {
             .get("grpc-timeout")
             .and_then(|header| header.to_str().ok())
             .and_then(parse_grpc_timeout);
-        let context = CallContext::arriving(timeout);
+        let reader = request.extensions().get::<Arc<Reader>>().cloned();
+        let client = reader
+            .as_ref()
+            .map_or(Client::Local, |reader| reader.client.clone());
+        let context = CallContext::arriving(timeout, client);
         let path = request.uri().path();
         let mut call = OpenCall::new(path, context.clone(), &self.in_flight, &self.reserve);
-        let reader = request.extensions().get::<Arc<Reader>>().cloned();
-        let place = match reader.as_ref().map(|reader| reader.calls.take()).transpose() {
+        let place = match reader.as_ref().map(|reader| reader.begin_call()).transpose() {
             Ok(place) => place,
             Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
         };
         let end = self.end(path, &context);
-        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads));
+        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads, context.client.clone()));
         // Beyond these bytes, an upload has a place and needs no other bound.
         let (largest, most_counted) = match upload {
             Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),

@@ -70,7 +70,7 @@ impl Handler {
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;
         let held = stored.hold();
-        let admission = self.executor.places.take()?;
+        let admission = self.executor.places.take(&call.client)?;
         // The budget starts after the object's preparation.
         let (mut derived, mut since) = match self.objects.kept(&stored, Need::Call) {
             Some(kept) => (kept, call.arrived),
