@@ -1,6 +1,6 @@
 //! A server inside the test, on its own port, and values of the core as its messages.
 
-use std::net::{Ipv6Addr, SocketAddr};
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use grasp_client::GraspClient;
 use grasp_proto::v1::{
@@ -20,6 +20,8 @@ const WORKERS: usize = 2;
 #[derive(Debug)]
 pub struct TestServer {
     address: SocketAddr,
+    /// Where it also listens.
+    second: SocketAddr,
     gauges: Gauges,
     stop: DropGuard,
     serving: JoinHandle<Result<(), ServeError>>,
@@ -44,12 +46,17 @@ impl TestServer {
             .await
             .expect("a free port of the loopback interface");
         let address = listener.local_addr().expect("a bound socket has an address");
+        let also = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await;
+        let also = also.expect("a free port of the loopback interface");
+        let second = also.local_addr().expect("a bound socket has an address");
         let server = Server::new(config).expect("the server starts");
         let gauges = server.gauges();
         let stop = CancellationToken::new();
-        let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));
+        let serving =
+            tokio::spawn(server.serve([listener.into(), also.into()], stop.clone().cancelled_owned()));
         Self {
             address,
+            second,
             gauges,
             stop: stop.drop_guard(),
             serving,
@@ -78,6 +85,13 @@ impl TestServer {
             .connect()
             .await
             .expect("the server accepts connections")
+    }
+
+    /// A connection of another client: it comes from another address.
+    pub async fn other_channel(&self) -> Channel {
+        let endpoint = Endpoint::from_shared(format!("http://{}", self.second));
+        let endpoint = endpoint.expect("an address is a valid endpoint");
+        endpoint.connect().await.expect("the server accepts connections")
     }
 
     /// The project's own client, on a new connection.
