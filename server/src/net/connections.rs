@@ -22,6 +22,9 @@ use crate::{
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
 const MAX_STALL: Duration = Duration::from_secs(20);
 
+/// How long a connection has to be idle to be closed for the sake of others' files.
+const SPARE: Duration = Duration::from_secs(10);
+
 const STALL_CHECK: Duration = Duration::from_secs(1);
 
 /// The open connections, and the bytes that wait on them.
@@ -86,14 +89,14 @@ impl Open {
     }
 
     /// Closes a connection, of this client or any, to make room: the one that has waited longest for the rest of its preface, or else
-    /// longest for a call. False if there is none.
-    fn evict(&mut self, of: Option<&Client>) -> bool {
+    /// longest for a call, and for this time at least. False if there is none.
+    fn evict(&mut self, of: Option<&Client>, idle: Duration) -> bool {
         let waiting = self.readers.iter().filter_map(|(&number, reader)| {
             let is_of = of.is_none_or(|client| reader.client == *client);
             let rank = match reader.phase() {
                 Phase::Greeting { since } => (0, since),
-                Phase::Idle { since } => (1, since),
-                Phase::Answering => return None,
+                Phase::Idle { since } if reader.left(since, idle).is_zero() => (1, since),
+                Phase::Idle { .. } | Phase::Answering => return None,
             };
             is_of.then_some((rank, number))
         });
@@ -139,7 +142,7 @@ impl Connections {
         };
         let free = self.maximum.saturating_sub(open.readers.len());
         let of = (held > 0).then_some(client);
-        if !frames.spend(PER_CONNECTION) || !may_hold_another(held, free) && !open.evict(of) {
+        if !frames.spend(PER_CONNECTION) || !may_hold_another(held, free) && !open.evict(of, Duration::ZERO) {
             return None;
         }
         // Clients without a connection are kept as long as their budget is not full; many at most for some seconds.
@@ -161,7 +164,7 @@ impl Connections {
 
     /// Closes the connection that can best be spared, where the process has no file left for another one.
     pub(super) fn make_room(&self) {
-        locked(&self.open).evict(None);
+        locked(&self.open).evict(None, SPARE);
     }
 
     /// Closes connections that stall, until this is dropped.

@@ -30,8 +30,8 @@ pub(super) const PER_CONNECTION: u64 = 4;
 /// Bytes of headers that cost as much as a frame.
 const HEADER_BYTES: usize = 256;
 
-/// Smallest data frame that is free: others are of messages in small pieces.
-const MIN_DATA: usize = 256;
+/// Smallest data frame, or chunk of HTTP/1, that is free: others are of messages in small pieces.
+pub(super) const MIN_DATA: usize = 256;
 
 const FRAME_HEADER: usize = 9;
 const DATA: u8 = 0;

@@ -235,6 +235,15 @@ impl Reader {
         }
     }
 
+    /// Takes frames off the client's budget; false if it is exceeded, for which the connection is closed.
+    pub(super) fn spend_frames(&self, frames: u64) -> bool {
+        let within = self.frames.spend(frames);
+        if !within {
+            self.close("its client sends frames that lead to nothing");
+        }
+        within
+    }
+
     /// Closes the connection at once.
     pub(super) fn close(&self, reason: &str) {
         tracing::warn!(

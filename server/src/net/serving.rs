@@ -5,10 +5,11 @@ use std::{
     hash::{BuildHasher as _, RandomState},
     pin::pin,
     sync::Arc,
+    task::{Context, Poll},
     time::Duration,
 };
 
-use http::{Request, Response};
+use http::{Request, Response, Version};
 use hyper::{body::Incoming, service::service_fn};
 use hyper_util::{
     rt::{TokioExecutor, TokioIo, TokioTimer},
@@ -16,15 +17,19 @@ use hyper_util::{
 };
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
-use tonic::body::Body;
+use tonic::{Status, body::Body};
 use tower::ServiceExt as _;
 
 use super::{
     connections::Admitted,
+    frames::MIN_DATA,
     reader::{Phase, Reader},
     stream::WatchedStream,
 };
-use crate::listen::Stream;
+use crate::{
+    listen::Stream,
+    middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+};
 
 /// Largest headers of a request, in bytes.
 const MAX_HEADERS: usize = 16 << 10;
@@ -96,10 +101,20 @@ pub(crate) struct Lifetime {
 impl<S: Service> Serving<S> {
     /// Serves a connection to its end.
     pub(super) async fn serve(self, stream: Stream, place: Admitted) {
-        let Self { service, lifetime } = self;
+        let Self {
+            service,
+            mut lifetime,
+        } = self;
+        // Of its own, so that connections do not share a lock whenever they are polled.
+        for token in [&mut lifetime.stop, &mut lifetime.close] {
+            *token = token.child_token();
+        }
         let reader = Arc::clone(&place);
         let answering = service_fn(move |request: Request<Incoming>| {
             let mut request = request.map(Body::new);
+            if request.version() < Version::HTTP_2 {
+                request = request.map(|body| filtered(body, ChunkCount(Arc::clone(&reader))));
+            }
             request.extensions_mut().insert(Arc::clone(&reader));
             service.clone().oneshot(request)
         });
@@ -168,6 +183,22 @@ async fn until_idle_for(reader: &Reader, time: Duration) {
             return;
         }
         tokio::time::sleep(left).await;
+    }
+}
+
+/// Counts the small chunks of a request over HTTP/1, as frames of HTTP/2 are.
+struct ChunkCount(Arc<Reader>);
+
+impl FrameFilter for ChunkCount {
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
+        let polled = next_frame(inner, cx);
+        if let Poll::Ready(Some(Ok(frame))) = &polled
+            && frame.data_ref().is_some_and(|data| data.len() < MIN_DATA)
+            && !self.0.spend_frames(1)
+        {
+            return Poll::Ready(Some(Err(Status::cancelled("the connection is being closed"))));
+        }
+        polled
     }
 }
 

@@ -63,8 +63,7 @@ impl WatchedStream {
             }
             Protocol::Http2(count) => {
                 let cost = count.cost(read);
-                if !self.reader.frames.spend(cost) {
-                    self.reader.close("its client sends frames that lead to nothing");
+                if !self.reader.spend_frames(cost) {
                     return Err(io::ErrorKind::ConnectionAborted.into());
                 }
             }

@@ -177,34 +177,6 @@ async fn a_long_search_does_not_block_others() {
     long.abort();
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn connections_beyond_the_limit_wait() {
-    let server = TestServer::start_with(|config| config.maximum_connections = 1.try_into().unwrap()).await;
-    let mut first = server.objects().await;
-    let list = v1::ListObjectsRequest::default;
-    first
-        .list_objects(list())
-        .await
-        .expect("the first connection has a place");
-    let mut second = server.objects_lazily();
-    let waiting = tokio::spawn(async move { second.list_objects(list()).await });
-    for _ in 0..50 {
-        first
-            .list_objects(list())
-            .await
-            .expect("the first connection keeps its place");
-    }
-    assert!(
-        !waiting.is_finished(),
-        "the second connection was served along with the first"
-    );
-    drop(first);
-    bounded("the second connection's answer", waiting)
-        .await
-        .unwrap()
-        .expect("the place is free");
-}
-
 /// A method with a large answer.
 const REFLECTION: &str = "grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
 

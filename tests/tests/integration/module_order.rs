@@ -16,7 +16,7 @@ const SERVER: &[&[&str]] = &[
     &["atlas_slots", "health_check", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],
-    &["connect", "memory", "objects", "track"],
+    &["connect", "memory", "objects", "open_files", "track"],
     &["atlases"],
     &["search"],
     &["services"],
