@@ -10,14 +10,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use grasp_admission::may_hold_another;
+
 use super::{
     frames::{FrameBudget, PER_CONNECTION},
     reader::{Phase, Reader},
 };
-use crate::{
-    client::Client,
-    limits::{locked, may_hold_another},
-};
+use crate::{client::Client, limits::locked};
 
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
 const MAX_STALL: Duration = Duration::from_secs(20);
