@@ -147,7 +147,7 @@ fn open(
 pub struct GraspClient {
     channel: Channel,
     pub(crate) call_timeout: Duration,
-    retry: RetryPolicy,
+    pub(crate) retry: RetryPolicy,
 }
 
 impl GraspClient {
@@ -280,7 +280,7 @@ impl GraspClient {
 }
 
 /// The status, or that of a lost connection: tonic has several codes for those, each with its cause. Every call may be sent again.
-fn of_transport(status: Status) -> Status {
+pub(crate) fn of_transport(status: Status) -> Status {
     match status.source() {
         Some(cause) if status.code() != Code::Unavailable => {
             Status::unavailable(format!("the connection was lost: {}: {cause}", status.message()))

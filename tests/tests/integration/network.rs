@@ -137,6 +137,8 @@ async fn create_through(server: SocketAddr, id: String, faults: Faults) -> bool 
     created.unwrap_or_else(|error| panic!("{faults:?}: {error}"));
     let found = bounded("a grasp", client.find_grasp(&floating_remote())).await;
     found.unwrap_or_else(|error| panic!("{faults:?}: {error}"));
+    let mesh = bounded("a mesh", client.get_mesh("objects/remote")).await;
+    mesh.unwrap_or_else(|error| panic!("{faults:?}: {error}"));
     proxy.connections.load(Ordering::Relaxed) > 1
 }
 
@@ -155,10 +157,14 @@ async fn connections_that_are_cut_anywhere_fail_no_call_and_repeat_none() {
         requests: Fault::CutAfter(bytes),
         answers: Fault::None,
     });
-    let answers = (0..1400).step_by(23).map(|bytes| Faults {
-        requests: Fault::None,
-        answers: Fault::CutAfter(bytes),
-    });
+    // The last ones are of the mesh.
+    let answers = (0..1400)
+        .step_by(23)
+        .chain((2000..20_000).step_by(3000))
+        .map(|bytes| Faults {
+            requests: Fault::None,
+            answers: Fault::CutAfter(bytes),
+        });
     for faults in requests.chain(answers) {
         running.spawn(create_through(
             server.address(),
