@@ -7,7 +7,7 @@
 //! `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and stops it when the call is
 //! dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages go through
 //! `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next. `budget` says how long a search
-//! may take, and how much of a deadline recent delays leave for it.
+//! may take, and how much of a deadline recent delays leave for it. `limits` shares places between clients, which `client` tells apart.
 //!
 //! `wire` converts single values of the contract, `middleware` is the form of layers around services. `web` lets pages in browsers
 //! call, and refuses pages of other origins and protocols other than gRPC, gRPC-Web and Connect, which `connect` turns into gRPC.
@@ -25,11 +25,11 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  error  listen  middleware  wire
-//! health_check  limits  viewer
-//! atlas_slots  net  saved  web
+//! budget  client  convention  error  middleware  wire
+//! limits  listen  viewer
+//! atlas_slots  executor  health_check  net  saved  web
 //! rigs
-//! answer  call  config  executor  validate
+//! answer  call  config  validate
 //! connect  memory  objects  track
 //! atlases
 //! search
@@ -46,6 +46,7 @@ mod atlas_slots;
 mod atlases;
 mod budget;
 mod call;
+mod client;
 pub mod config;
 mod connect;
 mod convention;

@@ -2,13 +2,14 @@
 
 use std::{
     num::NonZeroUsize,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-
-use crate::error::{Limit, ServiceError};
+use crate::{
+    client::Client,
+    error::{Limit, ServiceError},
+};
 
 /// Bound on the objects that clients create.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +23,7 @@ pub struct StoreLimits {
 /// Bounds on calls that stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StreamLimits {
-    /// Bytes of meshes uploaded in pieces, of all uploads together and thus of one.
+    /// Largest mesh uploaded in pieces, in bytes; all uploads together may have half as much again.
     pub upload_bytes: NonZeroUsize,
     /// Longest pause between the pieces of an upload.
     pub upload_idle: Duration,
@@ -47,39 +48,49 @@ pub(crate) const MAX_RESPONSE: usize = 4 << 20;
 /// Largest piece of an uploaded mesh, in bytes.
 pub(crate) const MAX_PIECE: usize = 1 << 20;
 
-/// Places that are taken as long as their permits live.
+/// Bytes that all uploads in pieces share, by the largest of them, which leaves a third to others.
+pub(crate) fn shared_upload_bytes(largest: usize) -> usize {
+    largest.saturating_add(largest / 2)
+}
+
+/// A place of a client.
+pub(crate) type Place = grasp_admission::Place<Client>;
+
+/// Places that clients share fairly, and that are taken as long as their [`Place`] lives.
 #[derive(Clone, Debug)]
 pub(crate) struct Places {
     limit: Limit,
-    maximum: usize,
     /// When a client without a place should try again.
     retry_after: Duration,
-    /// For code that waits for places.
-    pub free: Arc<Semaphore>,
+    all: grasp_admission::Places<Client>,
 }
 
 impl Places {
     pub(crate) fn new(limit: Limit, maximum: usize, retry_after: Duration) -> Self {
         Self {
             limit,
-            maximum,
             retry_after,
-            free: Arc::new(Semaphore::new(maximum)),
+            all: grasp_admission::Places::new(maximum),
         }
     }
 
-    /// Takes a place.
-    pub(crate) fn take(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
-        let place = Arc::clone(&self.free).try_acquire_owned();
+    /// Takes a place for a client.
+    pub(crate) fn take(&self, client: &Client) -> Result<Place, ServiceError> {
+        self.take_many(client, 1)
+    }
+
+    /// Takes some places for a client, together.
+    pub(crate) fn take_many(&self, client: &Client, count: usize) -> Result<Place, ServiceError> {
+        let place = self.all.take(client, count);
         place.map_err(|_| ServiceError::Overloaded {
             limit: self.limit,
-            maximum: self.maximum,
+            maximum: self.all.maximum(),
             retry_after: self.retry_after,
         })
     }
 
     pub(crate) fn taken(&self) -> usize {
-        self.maximum - self.free.available_permits()
+        self.all.taken()
     }
 }
 

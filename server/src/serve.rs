@@ -45,7 +45,7 @@ use crate::{
     },
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
-    services::{BYTES_PER_PERMIT, Handler, Shared, load_saved_rigs},
+    services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
     track::OpenTracks,
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
@@ -210,7 +210,7 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
-            resizer: Resizer(Arc::clone(&builds.free)),
+            resizer: Resizer(Arc::new(Semaphore::new(config.derivations()))),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
@@ -220,9 +220,8 @@ impl Server {
             deriving: Arc::new(Semaphore::new(config.derivations())),
             ahead: Semaphore::new(1),
             created: AtomicU64::new(0),
-            upload_bytes: Arc::new(Semaphore::new(
-                config.streams.upload_bytes.get().div_ceil(BYTES_PER_PERMIT),
-            )),
+            upload_bytes: upload_places(config.streams.upload_bytes.get()),
+            watchers: watcher_places(config.streams.watchers.get()),
             tracks: Arc::new(OpenTracks::new(config.streams.tracks.get())),
             calls: watch::Sender::new(()),
             unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
@@ -294,7 +293,7 @@ impl Server {
         self.read_saved().await?;
         let Self { handler, builds } = self;
         let config = &handler.config;
-        let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
+        let largest_upload = largest_upload(config);
         let grasps = GraspServiceServer::new(handler.clone())
             .accept_compressed(Gzip)
             .max_decoding_message_size(MAX_FIND_REQUEST)
@@ -346,15 +345,7 @@ impl Server {
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(Around(Calls {
-                in_flight: handler.calls.clone(),
-                uploads: builds,
-                upload_grace: 2 * config.streams.upload_idle,
-                packers: Arc::clone(&packers),
-                largest_upload,
-                reserve: Arc::clone(&handler.reserve),
-                longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
-            }))
+            .layer(Around(calls(&handler, builds, &packers)))
             .layer(Around(Transcoding {
                 largest_upload,
                 places: packers,
@@ -427,6 +418,27 @@ fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+}
+
+/// Largest message of an upload, in bytes.
+fn largest_upload(config: &Config) -> usize {
+    config.maximum_object_bytes.get() + BYTES_BESIDES_MESH
+}
+
+fn calls(handler: &Handler, builds: Places, packers: &Arc<Semaphore>) -> Calls {
+    let config = &handler.config;
+    Calls {
+        in_flight: handler.calls.clone(),
+        executor: handler.executor.clone(),
+        longest_search: config.budgets.maximum,
+        uploads: builds,
+        reads: Arc::default(),
+        upload_grace: 2 * config.streams.upload_idle,
+        packers: Arc::clone(packers),
+        largest_upload: largest_upload(config),
+        reserve: Arc::clone(&handler.reserve),
+        longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
+    }
 }
 
 async fn set_health(health: &HealthReporter, status: ServingStatus) {

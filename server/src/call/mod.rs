@@ -5,10 +5,11 @@
 
 mod layer;
 mod packing;
+mod reads;
 mod upload;
 
 use std::{
-    sync::{Arc, OnceLock},
+    sync::{Arc, Mutex, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
@@ -24,6 +25,9 @@ pub(crate) use self::{
 };
 use crate::{
     budget::DeadlineReserve,
+    client::Client,
+    executor::Admission,
+    limits::locked,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
@@ -36,6 +40,7 @@ pub(crate) struct CallContext {
     pub arrived: Instant,
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
+    pub client: Client,
     record: Arc<CallRecord>,
 }
 
@@ -49,6 +54,8 @@ struct CallRecord {
     due: OnceLock<Instant>,
     /// When it ended.
     ended: OnceLock<Instant>,
+    /// The right to search, until the handler takes it.
+    admission: Mutex<Option<Admission>>,
 }
 
 /// Log record of a search.
@@ -72,18 +79,31 @@ impl CallContext {
         Self {
             arrived,
             deadline: self.deadline,
+            client: self.client.clone(),
             record: Arc::default(),
         }
     }
 
-    fn arriving(timeout: Option<Duration>) -> Self {
+    fn arriving(timeout: Option<Duration>, client: Client) -> Self {
         let arrived = Instant::now();
         Self {
             arrived,
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
+            client,
             record: Arc::default(),
         }
+    }
+
+    /// The right to search that the call came with. Parts of a call have none.
+    pub(crate) fn take_admission(&self) -> Option<Admission> {
+        locked(&self.record.admission).take()
+    }
+
+    /// When a search that takes at most `longest` has to end.
+    pub(crate) fn latest_end(&self, longest: Duration) -> Instant {
+        let latest = self.arrived + longest;
+        self.deadline.map_or(latest, |deadline| deadline.min(latest))
     }
 
     /// When a call that is no search has to be answered, if it has a deadline.

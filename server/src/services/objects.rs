@@ -333,7 +333,8 @@ impl ObjectService for Handler {
         &self,
         request: Request<v1::WatchObjectsRequest>,
     ) -> Result<Response<Self::WatchObjectsStream>, Status> {
-        Ok(Response::new(self.watch(request.get_ref())?))
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.watch(request.get_ref(), &call)?))
     }
 }
 

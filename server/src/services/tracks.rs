@@ -9,10 +9,7 @@ use grasp_proto::{
     v1::{self, track_holdout_request::Message},
     wire_duration,
 };
-use tokio::{
-    sync::{OwnedSemaphorePermit, oneshot},
-    task::JoinSet,
-};
+use tokio::{sync::oneshot, task::JoinSet};
 use tonic::{Code, Status, Streaming};
 
 use super::{Handler, Shared, streaming::Messages};
@@ -20,7 +17,7 @@ use crate::{
     call::CallContext,
     convention::Convention,
     error::{Limit, ServiceError},
-    limits::MAX_FIND_REQUEST,
+    limits::{MAX_FIND_REQUEST, Place},
     track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, not_found},
     validate::{Frame, Latest, TrackPolicy, TrackQuery, sentences, track_query},
 };
@@ -43,7 +40,7 @@ struct Track {
     due: Option<Instant>,
     /// Keeps the object from being evicted between frames.
     held: Arc<()>,
-    _permit: OwnedSemaphorePermit,
+    _place: Place,
 }
 
 impl Handler {
@@ -123,7 +120,7 @@ impl Handler {
             current,
         } = track_query(track, is_pushed, self.known_rigs(), self.exists())?;
         call.log_object(&object_id);
-        let permit = self.tracks.places.take()?;
+        let place = self.tracks.places.take(&call.client)?;
         let object = self.object(&object_id, call).await?.object;
         // Prepares the object for searches before the first frame.
         self.derived(&object, call).await?;
@@ -141,7 +138,7 @@ impl Handler {
             opened: Instant::now(),
             due: call.answer_due().filter(|_| !is_pushed),
             held: object.hold(),
-            _permit: permit,
+            _place: place,
         })
     }
 }

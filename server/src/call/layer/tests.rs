@@ -68,6 +68,9 @@ impl Call {
 fn admitting_one() -> Calls {
     Calls {
         in_flight: watch::Sender::new(()),
+        executor: SearchExecutor::new(1, 8).expect("a thread starts"),
+        longest_search: Duration::from_secs(10),
+        reads: Arc::default(),
         uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),
         reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
