@@ -16,7 +16,7 @@ use crate::Running;
 const MIB: usize = 1 << 20;
 
 /// Memory that a bomb may take at its peak, beyond that of an idle server: that of some of the largest messages.
-const MAX_GROWTH: usize = 160 * MIB;
+const MAX_GROWTH: usize = 96 * MIB;
 
 /// Uploads at once.
 const UPLOADS: usize = 200;
@@ -59,6 +59,12 @@ fn bombs() -> Vec<Bomb> {
             CREATE_OBJECT,
             json,
             list(r#"{"object": {"regions": ["#, "{}", 15 * MIB),
+        ),
+        bomb(
+            "fewer empty regions in JSON",
+            CREATE_OBJECT,
+            json,
+            [&list(r#"{"object": {"regions": ["#, "{}", 780_000), &b"]}}"[..]].concat(),
         ),
         bomb(
             "numbers in JSON",
