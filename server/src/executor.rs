@@ -25,8 +25,8 @@ pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
-/// Jobs that have a turn at once: the second one keeps the workers busy while the first one begins or ends.
-const TURNS: usize = 2;
+/// Jobs that have a turn at once. Each uses all workers; another one's slice would come before its next.
+const TURNS: usize = 1;
 
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
@@ -69,10 +69,18 @@ impl Workers<'_> {
         Workers { pool, job: None }
     }
 
-    /// Does a slice of the job's work when its turn has come; at once if the job is over, which the work notices.
-    pub(crate) fn in_turn<T>(self, work: impl FnOnce(&ThreadPool) -> T) -> T {
-        let _turn = self.job.and_then(Job::turn);
+    /// Does a slice of the job's work when its turn has come. If there is none within `longest`, or the job is over, it has no time
+    /// left, which the work notices. The turn lasts until the next slice, or [`Self::end_turn`].
+    pub(crate) fn in_turn<T>(self, longest: Option<Duration>, work: impl FnOnce(&ThreadPool) -> T) -> T {
+        self.job.map(|job| job.next_turn(longest));
         work(self.pool)
+    }
+
+    /// Leaves the workers to others until the next slice.
+    pub(crate) fn end_turn(self) {
+        if let Some(job) = self.job {
+            job.end_turn();
+        }
     }
 }
 
@@ -198,7 +206,7 @@ mod tests {
         };
         for _ in 0..8 {
             let bad = executor.run(admit(), |workers, _| {
-                workers.in_turn(|pool| {
+                workers.in_turn(None, |pool| {
                     pool.in_place_scope(|scope| {
                         scope.spawn(|_| panic!("on purpose"));
                         scope.spawn(|_| {});
@@ -210,7 +218,9 @@ mod tests {
         }
         let threads = executor
             .run(admit(), |workers, _| {
-                workers.in_turn(|pool| pool.broadcast(|_| thread::current().name().map(str::to_owned)))
+                workers.in_turn(None, |pool| {
+                    pool.broadcast(|_| thread::current().name().map(str::to_owned))
+                })
             })
             .await
             .unwrap();

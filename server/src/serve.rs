@@ -200,6 +200,7 @@ impl Server {
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),
             heavy: Arc::new(ClientPermits::new(config.heavy_work())),
+            examining: ClientPermits::new(config.workers.get()),
             ahead: Semaphore::new(1),
             created: AtomicU64::new(0),
             upload_bytes: upload_places(config.streams.upload_bytes.get()),

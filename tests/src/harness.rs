@@ -89,8 +89,8 @@ impl TestServer {
     pub async fn channel_from(&self, address: IpAddr) -> Channel {
         let endpoint = Endpoint::from_shared(self.endpoint());
         let endpoint = endpoint.expect("an address is a valid endpoint");
-        let connecting = endpoint.local_address(Some(address)).connect();
-        connecting.await.expect("the server accepts connections")
+        let endpoint = endpoint.local_address(Some(address));
+        endpoint.connect().await.expect("the server accepts connections")
     }
 
     /// The project's own client, on a new connection.

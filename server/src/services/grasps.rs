@@ -52,10 +52,15 @@ impl Handler {
         call: &CallContext,
         work: impl FnOnce(FindJob, Workers<'_>, Stop<'_>) -> Result<Answered<T>, ServiceError> + Send + 'static,
     ) -> Result<T, ServiceError> {
+        // Each takes a core besides its turns at the workers.
+        let turn = before(call.answer_due(), self.examining.acquire(&call.client)).await?;
         let (admission, job) = self.ready(holdout, call).await?;
         let overdue = job.overdue();
         // Boxed: jobs of some kilobytes would make the futures of all calls large.
-        let work = Box::new(move |workers: Workers<'_>, stop: Stop<'_>| work(job, workers, stop));
+        let work = Box::new(move |workers: Workers<'_>, stop: Stop<'_>| {
+            let _turn = turn;
+            work(job, workers, stop)
+        });
         let answered = before(overdue, self.executor.run(admission, work)).await???;
         call.search_ended(answered.ended, answered.summary);
         Ok(answered.response)
