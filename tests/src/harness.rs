@@ -85,6 +85,14 @@ impl TestServer {
             .expect("the server accepts connections")
     }
 
+    /// A connection from another address of this machine, which counts for another client.
+    pub async fn channel_from(&self, address: IpAddr) -> Channel {
+        let endpoint = Endpoint::from_shared(self.endpoint());
+        let endpoint = endpoint.expect("an address is a valid endpoint");
+        let connecting = endpoint.local_address(Some(address)).connect();
+        connecting.await.expect("the server accepts connections")
+    }
+
     /// The project's own client, on a new connection.
     pub async fn client(&self) -> GraspClient {
         GraspClient::connect(&self.endpoint())

@@ -186,6 +186,12 @@ impl Config {
         self.maximum_uploads.get().div_ceil(2)
     }
 
+    /// Number of objects and rigs that one client builds or prepares at a time: those take a core each, of which other clients keep
+    /// half.
+    pub(crate) fn heavy_work(&self) -> usize {
+        (self.workers.get() / 2).clamp(1, self.maximum_uploads.get())
+    }
+
     /// Largest mesh file in bytes, in one message or in pieces.
     pub(crate) fn largest_mesh(&self) -> NonZeroUsize {
         self.maximum_object_bytes.max(self.streams.upload_bytes)
