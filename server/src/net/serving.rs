@@ -121,20 +121,18 @@ impl<S: Service> Serving<S> {
         let io = TokioIo::new(WatchedStream::new(stream, Arc::clone(&place)));
         let transport = transport();
         let mut connection = pin!(transport.serve_connection(io, answering));
-        let mut leaving = pin!(lifetime.until_leaving(&place));
-        loop {
-            tokio::select! {
-                biased;
-                () = lifetime.close.cancelled() => return,
-                () = place.closed() => return,
-                ended = &mut connection => {
-                    if let Err(error) = ended {
-                        tracing::debug!(%error, client = %place.client, "a connection ended with an error");
-                    }
-                    return;
+        let leaving = lifetime.until_leaving(&place);
+        tokio::select! {
+            biased;
+            () = lifetime.close.cancelled() => return,
+            () = place.closed() => return,
+            ended = &mut connection => {
+                if let Err(error) = ended {
+                    tracing::debug!(%error, client = %place.client, "a connection ended with an error");
                 }
-                () = &mut leaving => break,
+                return;
             }
+            () = leaving => {}
         }
         connection.as_mut().graceful_shutdown();
         tokio::select! {

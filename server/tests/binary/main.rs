@@ -1,4 +1,4 @@
-//! The binary: exit codes, messages, signals, health checks, and memory limits.
+//! The binary: exit codes, messages, signals, health checks, and limits on memory and files.
 #![cfg(target_os = "linux")]
 
 mod bombs;
