@@ -11,7 +11,8 @@
 //!
 //! `wire` converts single values of the contract, `middleware` is the form of layers around services. `web` lets pages in browsers
 //! call, and refuses pages of other origins and protocols other than gRPC, gRPC-Web and Connect, which `connect` turns into gRPC.
-//! `listen` has the addresses and sockets on which the server listens.
+//! `listen` has the addresses and sockets on which the server listens, `tls` encrypts connections, and `reload` reads changed files
+//! again.
 //!
 //! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
 //! contents.
@@ -25,8 +26,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  client  convention  error  middleware  wire
-//! limits  listen  viewer
+//! budget  client  convention  error  middleware  reload  wire
+//! limits  listen  tls  viewer
 //! atlas_slots  health_check  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
@@ -59,11 +60,13 @@ mod memory;
 mod middleware;
 mod net;
 mod objects;
+mod reload;
 mod rigs;
 mod saved;
 mod search;
 mod serve;
 mod services;
+mod tls;
 mod track;
 mod validate;
 mod viewer;
@@ -77,6 +80,8 @@ pub use limits::{StoreLimits, StreamLimits};
 pub use listen::{ListenAddress, Listener};
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
+pub use reload::Reloader;
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};
+pub use tls::TlsFiles;
 pub use web::WebOrigins;

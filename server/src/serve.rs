@@ -43,9 +43,11 @@ use crate::{
         saved::SavedObjects,
         store::ObjectStore,
     },
+    reload::{Reloader, Watched, keep_current},
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
+    tls::Tls,
     track::OpenTracks,
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
@@ -101,6 +103,9 @@ pub enum ServeError {
         /// The cause.
         source: std::io::Error,
     },
+    /// Files of certificates cannot be used.
+    #[error("{}", .0.join("\n"))]
+    Secrets(Vec<String>),
     /// The builder threads cannot be started.
     #[error("cannot start the atlas builders: {0}")]
     Builders(std::io::Error),
@@ -117,6 +122,8 @@ pub enum ServeError {
 pub struct Server {
     handler: Handler,
     builds: Places,
+    tls: Option<Arc<Tls>>,
+    reloader: Reloader,
 }
 
 /// The server's activity, for tests and monitoring.
@@ -169,6 +176,8 @@ impl Server {
     /// # Errors
     /// See [`ServeError`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
+        let tls = config.tls.clone().map(Tls::open).transpose();
+        let tls = tls.map_err(ServeError::Secrets)?.map(Arc::new);
         prepare_hands();
         let directory = match &config.objects_directory {
             Some(path) => {
@@ -231,6 +240,8 @@ impl Server {
         Ok(Self {
             handler: Handler(Arc::new(shared)),
             builds,
+            tls,
+            reloader: Reloader::default(),
         })
     }
 
@@ -256,6 +267,11 @@ impl Server {
     /// The server's activity.
     pub fn gauges(&self) -> Gauges {
         Gauges(self.handler.clone())
+    }
+
+    /// Makes the server read its certificates again.
+    pub fn reloader(&self) -> Reloader {
+        self.reloader.clone()
     }
 
     /// Serves on one or more listeners, which share all limits; see [`run`].
@@ -291,7 +307,12 @@ impl Server {
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
         self.read_saved().await?;
-        let Self { handler, builds } = self;
+        let Self {
+            handler,
+            builds,
+            tls,
+            reloader,
+        } = self;
         let config = &handler.config;
         let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
         let grasps = GraspServiceServer::new(handler.clone())
@@ -320,6 +341,7 @@ impl Server {
         let incoming = accept(
             listeners,
             config.maximum_connections.get(),
+            tls.clone(),
             Arc::clone(&handler.unread),
             stop.clone(),
             close.clone(),
@@ -370,6 +392,7 @@ impl Server {
         let _builders_end = handler.atlases.stopper();
         let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
+        let watched = tls.into_iter().map(|tls| Watched::new(tls)).collect();
         let shutting_down = async {
             shutdown.await;
             tracing::info!(calls = handler.calls.receiver_count(), "draining");
@@ -389,6 +412,7 @@ impl Server {
         tokio::select! {
             served = serving => served?,
             () = handler.unread.close_stalled() => {}
+            () = keep_current(watched, reloader) => {}
             () = shutting_down => {}
         }
         tracing::info!("stopped");

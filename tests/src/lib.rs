@@ -1,6 +1,7 @@
-//! Shared by integration tests and benches: a server inside the process, recorded hands, placed givers, and random
+//! Shared by integration tests and benches: a server inside the process, its certificates, recorded hands, placed givers, and random
 //! holdouts.
 
+pub mod certificates;
 mod harness;
 pub mod random_holdouts;
 pub mod recorded;

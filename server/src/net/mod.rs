@@ -21,12 +21,16 @@ use tokio::{
     time::Sleep,
 };
 use tokio_stream::wrappers::ReceiverStream;
-use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
+use tokio_util::{
+    either::Either,
+    sync::{CancellationToken, WaitForCancellationFutureOwned},
+};
 use tonic::transport::server::Connected;
 
 use crate::{
     client::Client,
     listen::{Listener, Stream},
+    tls::{Tls, TlsStream},
 };
 pub(crate) use answers::{UnreadCount, arriving};
 pub(crate) use unread::{Reader, UnreadAnswers};
@@ -34,7 +38,7 @@ pub(crate) use unread::{Reader, UnreadAnswers};
 /// Largest headers of a request, in bytes.
 pub(crate) const MAX_HEADERS: usize = 16 << 10;
 
-/// Longest wait for a client's HTTP/2 preface, or as many bytes of a request.
+/// Longest wait for a client's HTTP/2 preface, or as many bytes of a request, the handshake of TLS included.
 const PREFACE_TIME: Duration = Duration::from_secs(10);
 
 /// First pause after an accept failed for lack of resources; doubles up to [`MAX_PAUSE`].
@@ -49,10 +53,11 @@ const PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 const HEADERS_READ: usize = 4 << 10;
 
 /// Accepts connections until `stop`, which closes the listeners immediately; beyond `most` open ones of all listeners together, others
-/// wait in the kernel's queue. `close` ends every connection.
+/// wait in the kernel's queue. With `tls`, connections of TCP are encrypted. `close` ends every connection.
 pub(crate) fn accept(
     mut listeners: Vec<Listener>,
     most: usize,
+    tls: Option<Arc<Tls>>,
     unread: Arc<UnreadAnswers>,
     stop: CancellationToken,
     close: CancellationToken,
@@ -67,7 +72,15 @@ pub(crate) fn accept(
             match accept_any(&mut listeners).await {
                 Ok((stream, client)) => {
                     pause = FIRST_PAUSE;
-                    let connection = Connection::new(stream, place, unread.connect(client), close.clone());
+                    let reader = unread.connect(client);
+                    let stream = match (&tls, stream) {
+                        (Some(tls), stream @ Either::Left(_)) => {
+                            Either::Right(TlsStream::new(tls.config(), stream, Arc::clone(&reader.peer)))
+                        }
+                        // A socket of the file system is private without.
+                        (_, stream) => Either::Left(stream),
+                    };
+                    let connection = Connection::new(stream, place, reader, close.clone());
                     if sender.send(Ok(connection)).await.is_err() {
                         return;
                     }
@@ -112,7 +125,7 @@ fn concerns_one_connection(error: &io::Error) -> bool {
 /// off.
 #[derive(Debug)]
 pub(crate) struct Connection {
-    stream: Stream,
+    stream: PlainOrTls,
     closed: Pin<Box<WaitForCancellationFutureOwned>>,
     cut_off: Pin<Box<WaitForCancellationFutureOwned>>,
     reader: Arc<Reader>,
@@ -121,6 +134,8 @@ pub(crate) struct Connection {
     headers: Option<Headers>,
     _place: OwnedSemaphorePermit,
 }
+
+type PlainOrTls = Either<Stream, TlsStream<Stream>>;
 
 #[derive(Debug)]
 struct Preface {
@@ -139,7 +154,7 @@ struct Headers {
 
 impl Connection {
     fn new(
-        stream: Stream,
+        stream: PlainOrTls,
         place: OwnedSemaphorePermit,
         reader: Arc<Reader>,
         close: CancellationToken,
@@ -284,6 +299,7 @@ mod tests {
         let mut client = TcpStream::connect(address).await.unwrap();
         let (stream, _) = listener.accept().await.unwrap();
         let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
+        let stream = Either::Left(stream);
         let mut connection = Connection::new(stream, place, Arc::clone(&reader), CancellationToken::new());
         let sending = tokio::spawn(async move {
             // More than is read before reading fails.

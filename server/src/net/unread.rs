@@ -21,6 +21,7 @@ use crate::{
     client::Client,
     error::{Limit, ServiceError},
     limits::{MAX_RESPONSE, locked},
+    tls::PeerName,
 };
 
 /// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size.
@@ -66,6 +67,8 @@ pub(crate) struct Reader {
     calls: Arc<Semaphore>,
     /// Whose connection it is.
     pub(crate) client: Client,
+    /// The name in the client's certificate, if it has one.
+    pub(crate) peer: PeerName,
     /// Cancelled to close the connection at once.
     pub(super) cut_off: CancellationToken,
 }
@@ -120,6 +123,7 @@ impl UnreadAnswers {
             answering: Arc::default(),
             calls: Arc::new(Semaphore::new(MAX_CALLS)),
             client,
+            peer: PeerName::default(),
             cut_off: CancellationToken::new(),
         });
         let mut readers = locked(&self.readers);

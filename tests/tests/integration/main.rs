@@ -16,6 +16,7 @@ mod real_input;
 mod reported;
 mod saved;
 mod saved_by_0_1;
+mod secure;
 mod standard;
 mod streams;
 mod tracks;

@@ -11,8 +11,16 @@ use std::{
 
 /// The server's top-level modules, as documented in its `lib.rs`.
 const SERVER: &[&[&str]] = &[
-    &["budget", "client", "convention", "error", "middleware", "wire"],
-    &["limits", "listen", "viewer"],
+    &[
+        "budget",
+        "client",
+        "convention",
+        "error",
+        "middleware",
+        "reload",
+        "wire",
+    ],
+    &["limits", "listen", "tls", "viewer"],
     &["atlas_slots", "health_check", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],
