@@ -1,6 +1,7 @@
 //! The client: connection, deadlines, retries.
 
 use std::{
+    fmt,
     future::Future,
     pin::Pin,
     time::{Duration, Instant},
@@ -49,7 +50,17 @@ pub struct GraspClientBuilder {
     retry: RetryPolicy,
     authorization: Option<Authorization>,
     ca: Option<Certificate>,
-    identity: Option<Identity>,
+    identity: Option<ClientIdentity>,
+}
+
+/// A certificate and its key, which no log shows.
+#[derive(Clone)]
+struct ClientIdentity(Identity);
+
+impl fmt::Debug for ClientIdentity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("ClientIdentity")
+    }
 }
 
 /// The value of the header that every call has.
@@ -101,7 +112,7 @@ impl GraspClientBuilder {
     /// Shows a certificate (PEM) to the server, with its key, for servers that know their clients by certificates.
     #[must_use]
     pub fn client_certificate(mut self, pem: impl AsRef<[u8]>, key: impl AsRef<[u8]>) -> Self {
-        self.identity = Some(Identity::from_pem(pem, key));
+        self.identity = Some(ClientIdentity(Identity::from_pem(pem, key)));
         self
     }
 
@@ -152,7 +163,7 @@ impl GraspClientBuilder {
                 Some(ca) => ClientTlsConfig::new().ca_certificate(ca.clone()),
                 None => ClientTlsConfig::new().with_native_roots(),
             };
-            if let Some(identity) = &self.identity {
+            if let Some(ClientIdentity(identity)) = &self.identity {
                 tls = tls.identity(identity.clone());
             }
             endpoint = endpoint

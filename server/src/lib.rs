@@ -2,7 +2,7 @@
 //!
 //! [`run`] serves on a listener, and [`Server::serve`] on several, until it is shut down; the binary `grasp-server` adds flags, logs and signals.
 //!
-//! A request passes these modules: `call` records its arrival and deadline; `services` handles it; `validate` turns the message
+//! A request passes these modules: `call` records its arrival and deadline, and `access` lets it in or refuses it; `services` handles it; `validate` turns the message
 //! into checked values or a list of all errors; `objects` finds the object with its search structures, `rigs` the hands, and
 //! `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and stops it when the call is
 //! dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages go through
@@ -28,7 +28,7 @@
 //! ```text
 //! budget  client  convention  error  middleware  reload  wire
 //! limits  listen  tls  viewer
-//! atlas_slots  health_check  net  saved  web
+//! access  atlas_slots  health_check  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
 //! connect  memory  objects  track
@@ -42,6 +42,7 @@
 //! the engines' axes, only `error` knows status codes, and only `executor`, `atlases` and the preparation of objects
 //! and hands start threads.
 
+mod access;
 mod answer;
 mod atlas_slots;
 mod atlases;
@@ -73,6 +74,7 @@ mod viewer;
 mod web;
 mod wire;
 
+pub use access::new_token;
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
 pub use health_check::check_health;

@@ -9,7 +9,7 @@ use std::{
 
 use crate::{
     client::Client,
-    error::{Limit, ServiceError},
+    error::{Limit, Quota, ServiceError},
 };
 
 /// Bound on the objects that clients create.
@@ -102,12 +102,40 @@ impl Places {
         self.take_many(client, 1)
     }
 
+    /// Takes a place for a client that may hold at most so many, if it has a quota.
+    pub(crate) fn take_within(
+        &self,
+        client: &Client,
+        quota: Quota,
+        most: Option<usize>,
+    ) -> Result<Place, ServiceError> {
+        self.take_up_to(client, 1, most.map(|most| (quota, most)))
+    }
+
     /// Takes places for a client; more than one only together.
     pub(crate) fn take_many(&self, client: &Client, count: usize) -> Result<Place, ServiceError> {
+        self.take_up_to(client, count, None)
+    }
+
+    fn take_up_to(
+        &self,
+        client: &Client,
+        count: usize,
+        own: Option<(Quota, usize)>,
+    ) -> Result<Place, ServiceError> {
         let shared = &*self.0;
         let mut held = locked(&shared.held);
         let free = shared.maximum - held.total;
         let of_client = held.by_client.get(client).copied().unwrap_or(0);
+        if let Some((quota, most)) = own
+            && of_client + count > most
+        {
+            return Err(ServiceError::QuotaExceeded {
+                quota,
+                maximum: most as u64,
+                retry_after: Some(shared.retry_after),
+            });
+        }
         // The last of them decides; the first ones of a client that has none may be all that are free.
         let is_allowed = if of_client == 0 {
             count <= free
@@ -190,6 +218,21 @@ mod tests {
             let taken: usize = shares(64, clients).iter().sum();
             assert!(taken < 64, "{clients}");
         }
+    }
+
+    #[test]
+    fn a_client_with_a_quota_gets_no_more_places() {
+        let places = Places::new(Limit::Searches, 10, Duration::from_millis(50));
+        let take = |number| places.take_within(&client(number), Quota::Searches, Some(2));
+        let held = [take(1).unwrap(), take(1).unwrap(), take(2).unwrap()];
+        let refused = ServiceError::QuotaExceeded {
+            quota: Quota::Searches,
+            maximum: 2,
+            retry_after: Some(Duration::from_millis(50)),
+        };
+        assert_eq!(take(1).unwrap_err(), refused);
+        drop(held);
+        take(1).unwrap();
     }
 
     #[test]

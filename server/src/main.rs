@@ -14,7 +14,7 @@ use futures_util::future::select_all;
 use grasp_server::{
     Config, ConfigError, ListenAddress, Listener, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
-    is_reserved_memory_limited, warn_of_memory,
+    is_reserved_memory_limited, new_token, warn_of_memory,
 };
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::{
@@ -31,8 +31,8 @@ const RUNTIME_END: Duration = Duration::from_millis(500);
 ///
 /// The server refuses to start, prints the reason and exits with 1 if a value or an object of the objects directory is
 /// invalid. After SIGTERM, SIGINT or SIGQUIT it answers running calls and exits with 0. After SIGHUP it does the same if its
-/// standard input is a terminal, which sends the signal when it is closed; otherwise it reads certificates and the
-/// filter of the log again.
+/// standard input is a terminal, which sends the signal when it is closed; otherwise it reads certificates, tokens
+/// and the filter of the log again.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
 struct Flags {
@@ -50,6 +50,11 @@ struct Flags {
     /// Print the descriptor set of the contract, for tools without reflection, and exit.
     #[arg(long, conflicts_with_all = ["print_config", "health_check"])]
     descriptor_set: bool,
+    /// Make a token for a client, print its entry for the file of tokens and, to standard error, the secret, and exit.
+    ///
+    /// grasp-server --new-token NAME >> tokens.toml
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["print_config", "health_check", "descriptor_set"])]
+    new_token: Option<String>,
     #[command(flatten)]
     values: RawConfig,
 }
@@ -89,6 +94,12 @@ fn configuration(flags: &Flags) -> Result<(RawConfig, Config), ConfigError> {
 fn start(flags: &Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
     if flags.descriptor_set {
         print_descriptor_set()?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(name) = &flags.new_token {
+        let (secret, entry) = new_token(name)?;
+        print!("{entry}");
+        eprintln!("{secret}");
         return Ok(ExitCode::SUCCESS);
     }
     let (values, config) = configuration(flags)?;

@@ -84,6 +84,9 @@ impl Watched {
         }
         // Broken files are read again when they change again.
         self.loaded = now;
+        if self.loaded.is_empty() {
+            return;
+        }
         let subject = self.source.subject();
         match self.source.reload() {
             Ok(()) => {

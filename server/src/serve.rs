@@ -26,6 +26,7 @@ use tonic_web::GrpcWebLayer;
 use tower::util::option_layer;
 
 use crate::{
+    access::Door,
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
     call::{BySize, Calls},
@@ -103,7 +104,7 @@ pub enum ServeError {
         /// The cause.
         source: std::io::Error,
     },
-    /// Files of certificates cannot be used.
+    /// Files of certificates or tokens cannot be used.
     #[error("{}", .0.join("\n"))]
     Secrets(Vec<String>),
     /// The builder threads cannot be started.
@@ -123,6 +124,7 @@ pub struct Server {
     handler: Handler,
     builds: Places,
     tls: Option<Arc<Tls>>,
+    door: Arc<Door>,
     reloader: Reloader,
 }
 
@@ -177,7 +179,17 @@ impl Server {
     /// See [`ServeError`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
         let tls = config.tls.clone().map(Tls::open).transpose();
-        let tls = tls.map_err(ServeError::Secrets)?.map(Arc::new);
+        let takes_certificates = config.tls.as_ref().is_some_and(|tls| tls.client_ca.is_some());
+        let door = Door::open(config.tokens_file.clone(), takes_certificates);
+        let (tls, door) = match (tls, door) {
+            (Ok(tls), Ok(door)) => (tls.map(Arc::new), Arc::new(door)),
+            (tls, door) => {
+                let problems = [tls.err(), door.err()];
+                return Err(ServeError::Secrets(
+                    problems.into_iter().flatten().flatten().collect(),
+                ));
+            }
+        };
         prepare_hands();
         let directory = match &config.objects_directory {
             Some(path) => {
@@ -241,6 +253,7 @@ impl Server {
             handler: Handler(Arc::new(shared)),
             builds,
             tls,
+            door,
             reloader: Reloader::default(),
         })
     }
@@ -269,7 +282,7 @@ impl Server {
         Gauges(self.handler.clone())
     }
 
-    /// Makes the server read its certificates again.
+    /// Makes the server read its certificates and tokens again.
     pub fn reloader(&self) -> Reloader {
         self.reloader.clone()
     }
@@ -311,6 +324,7 @@ impl Server {
             handler,
             builds,
             tls,
+            door,
             reloader,
         } = self;
         let config = &handler.config;
@@ -368,6 +382,7 @@ impl Server {
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
             .layer(Around(Calls {
+                door: Arc::clone(&door),
                 in_flight: handler.calls.clone(),
                 uploads: builds,
                 upload_grace: 2 * config.streams.upload_idle,
@@ -392,7 +407,8 @@ impl Server {
         let _builders_end = handler.atlases.stopper();
         let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
-        let watched = tls.into_iter().map(|tls| Watched::new(tls)).collect();
+        let mut watched = vec![Watched::new(door)];
+        watched.extend(tls.map(|tls| Watched::new(tls)));
         let shutting_down = async {
             shutdown.await;
             tracing::info!(calls = handler.calls.receiver_count(), "draining");

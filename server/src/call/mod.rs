@@ -23,6 +23,7 @@ pub(crate) use self::{
     upload::UploadPermit,
 };
 use crate::{
+    access::Caller,
     budget::DeadlineReserve,
     client::Client,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
@@ -38,6 +39,7 @@ pub(crate) struct CallContext {
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
     pub client: Client,
+    pub caller: Caller,
     record: Arc<CallRecord>,
 }
 
@@ -75,6 +77,7 @@ impl CallContext {
             arrived,
             deadline: self.deadline,
             client: self.client.clone(),
+            caller: self.caller.clone(),
             record: Arc::default(),
         }
     }
@@ -86,8 +89,17 @@ impl CallContext {
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
             client,
+            caller: Caller::default(),
             record: Arc::default(),
         }
+    }
+
+    /// Makes it the call of a client that a token or certificate names.
+    fn identify(&mut self, caller: Caller) {
+        if let Some(name) = caller.name() {
+            self.client = Client::Named(Arc::clone(name));
+        }
+        self.caller = caller;
     }
 
     /// When a call that is no search has to be answered, if it has a deadline.

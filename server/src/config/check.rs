@@ -103,18 +103,19 @@ impl Check {
             .filter(|address| !address.is_private())
             .map(ToString::to_string)
             .collect();
-        let tls = config.tls.as_ref();
-        let is_safe = tls.is_some_and(|tls| tls.client_ca.is_some());
-        if public.is_empty() || is_safe || config.insecure_public {
+        let knows_clients = config.tokens_file.is_some();
+        let missing = match &config.tls {
+            None => "TLS",
+            Some(tls) if tls.client_ca.is_none() && !knows_clients => "knowing its clients",
+            Some(_) => return,
+        };
+        if public.is_empty() || config.insecure_public {
             return;
         }
-        let missing = match tls {
-            None => "TLS",
-            Some(_) => "knowing its clients",
-        };
         self.0.push(format!(
-            "listen is {}, which other machines may reach, without {missing}; it must be a loopback address or unix:/PATH, or need \
-             tls_certificate, tls_key and tls_client_ca, or insecure_public, with which anyone may call there or read along",
+            "listen is {}, which other machines may reach, without {missing}; there must be tls_certificate and tls_key, and tokens_file \
+             or tls_client_ca, or only loopback addresses and unix:/PATH, or insecure_public, with which anyone may call there and read \
+             along",
             public.join(", "),
         ));
     }

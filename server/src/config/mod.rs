@@ -47,6 +47,8 @@ pub struct Config {
     pub listen: Vec<ListenAddress>,
     /// Certificates, with which connections of TCP are encrypted. `None` for connections in the clear.
     pub tls: Option<TlsFiles>,
+    /// File of the tokens that calls need. `None` if they need none.
+    pub tokens_file: Option<PathBuf>,
     /// Lets anyone call who can reach an address of another interface than loopback, in the clear.
     pub insecure_public: bool,
     /// Number of search threads. More find grasps sooner, up to the number of cores.
@@ -109,6 +111,7 @@ impl Default for Config {
         Self {
             listen: vec![ListenAddress::DEFAULT],
             tls: None,
+            tokens_file: None,
             insecure_public: false,
             workers: cores,
             // Messages are small: a thread serves thousands of calls per second.

@@ -44,6 +44,11 @@ pub struct RawConfig {
     /// File with certificates of authorities in PEM, whose clients are known by their own certificates [default: none].
     #[arg(long, env = "GRASP_TLS_CLIENT_CA", value_name = "FILE", value_parser = any_path())]
     pub tls_client_ca: Option<PathBuf>,
+    /// File of the tokens that calls need, without their secrets [default: none].
+    ///
+    /// `--new-token` makes an entry. Changes are taken up while the server runs.
+    #[arg(long, env = "GRASP_TOKENS_FILE", value_name = "FILE", value_parser = any_path())]
+    pub tokens_file: Option<PathBuf>,
     /// Listen on addresses that other machines may reach although anyone may call there or read along [default: false].
     ///
     /// Without it, such addresses need TLS, and tokens or certificates of clients.
@@ -253,6 +258,7 @@ impl RawConfig {
         read!(file(tls_key => key,));
         read!(file(tls_client_ca => client_ca,));
         config.tls = check.tls(certificate, key, client_ca);
+        read!(file(tokens_file => config.tokens_file,));
         let insecure_public = self.insecure_public.or(fallback.insecure_public);
         config.insecure_public = insecure_public.unwrap_or(config.insecure_public);
         self.insecure_public = Some(config.insecure_public);
@@ -356,7 +362,7 @@ mod tests {
     #[test]
     fn reports_every_invalid_value_with_its_key() {
         // Five numbers may be 0.
-        for (number, expected) in [(0, 30), (i64::MAX, 35)] {
+        for (number, expected) in [(0, 31), (i64::MAX, 36)] {
             let mut raw = RawConfig::default();
             raw.complete(RawConfig::default()).unwrap();
             let mut keys = toml::Table::try_from(&raw).unwrap();
@@ -370,9 +376,10 @@ mod tests {
                 };
             }
             let paths = ["objects_directory", "atlas_directory"];
-            let paths = paths
-                .into_iter()
-                .chain(["tls_certificate", "tls_key", "tls_client_ca"]);
+            let paths =
+                paths
+                    .into_iter()
+                    .chain(["tls_certificate", "tls_key", "tls_client_ca", "tokens_file"]);
             keys.extend(paths.map(|key| (key.to_owned(), "".into())));
             let mut raw: RawConfig = keys.try_into().unwrap();
             let Err(ConfigError::BadValues(bad)) = raw.complete(RawConfig::default()) else {
@@ -424,7 +431,9 @@ mod tests {
             ("", Err("TLS")),
             (tls, Err("knowing its clients")),
             ("insecure_public = true", Ok(())),
+            ("tokens_file = 'd'", Err("TLS")),
             (&format!("{tls}; tls_client_ca = 'c'"), Ok(())),
+            (&format!("{tls}; tokens_file = 'd'"), Ok(())),
         ] {
             let answer = complete(&format!("listen = '[::1]:1,0.0.0.0:2,192.0.2.1:3'; {others}"));
             match (answer, expected) {

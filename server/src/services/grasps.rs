@@ -19,7 +19,7 @@ use super::{
 use crate::{
     budget::effective_budget,
     call::CallContext,
-    error::ServiceError,
+    error::{Quota, ServiceError},
     executor::{Admission, before},
     objects::{derived::ObjectSize, store::Need},
     search::{self, Answered, FindJob, Stream},
@@ -70,7 +70,10 @@ impl Handler {
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;
         let held = stored.hold();
-        let admission = self.executor.places.take(&call.client)?;
+        let admission =
+            self.executor
+                .places
+                .take_within(&call.client, Quota::Searches, call.caller.quotas().searches)?;
         // The budget starts after the object's preparation.
         let (mut derived, mut since) = match self.objects.kept(&stored, Need::Call) {
             Some(kept) => (kept, call.arrived),
@@ -230,7 +233,8 @@ impl GraspService for Handler {
     }
 
     async fn delete_track(&self, request: Request<v1::DeleteTrackRequest>) -> Result<Response<()>, Status> {
-        self.tracks.delete(&request.into_inner().name).await?;
+        let caller = CallContext::of(&request).caller;
+        self.tracks.delete(&request.into_inner().name, &caller).await?;
         Ok(Response::new(()))
     }
 

@@ -1,5 +1,6 @@
 //! The server over real gRPC, in one binary that is linked once.
 
+mod access;
 mod atlases;
 mod connect;
 mod conventions;

@@ -21,7 +21,7 @@ const SERVER: &[&[&str]] = &[
         "wire",
     ],
     &["limits", "listen", "tls", "viewer"],
-    &["atlas_slots", "health_check", "net", "saved", "web"],
+    &["access", "atlas_slots", "health_check", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],
     &["connect", "memory", "objects", "track"],

@@ -67,6 +67,7 @@ impl Call {
 
 fn admitting_one() -> Calls {
     Calls {
+        door: Arc::new(Door::open(None, false).unwrap()),
         in_flight: watch::Sender::new(()),
         uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),
