@@ -28,9 +28,9 @@
 //! ```text
 //! budget  client  convention  error  middleware  reload  wire
 //! limits  listen  tls  viewer
-//! access  atlas_slots  health_check  net  saved  web
+//! access  atlas_slots  executor  health_check  net  saved  web
 //! rigs
-//! answer  call  config  executor  validate
+//! answer  call  config  validate
 //! connect  memory  objects  track
 //! atlases
 //! search

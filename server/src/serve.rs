@@ -328,7 +328,7 @@ impl Server {
             reloader,
         } = self;
         let config = &handler.config;
-        let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
+        let largest_upload = largest_upload(config);
         let grasps = GraspServiceServer::new(handler.clone())
             .accept_compressed(Gzip)
             .max_decoding_message_size(MAX_FIND_REQUEST)
@@ -381,16 +381,7 @@ impl Server {
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(Around(Calls {
-                door: Arc::clone(&door),
-                in_flight: handler.calls.clone(),
-                uploads: builds,
-                upload_grace: 2 * config.streams.upload_idle,
-                packers: Arc::clone(&packers),
-                largest_upload,
-                reserve: Arc::clone(&handler.reserve),
-                longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
-            }))
+            .layer(Around(calls(&handler, Arc::clone(&door), builds, &packers)))
             .layer(Around(Transcoding {
                 largest_upload,
                 places: packers,
@@ -466,6 +457,28 @@ fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+}
+
+/// Largest message of an upload, in bytes.
+fn largest_upload(config: &Config) -> usize {
+    config.maximum_object_bytes.get() + BYTES_BESIDES_MESH
+}
+
+fn calls(handler: &Handler, door: Arc<Door>, builds: Places, packers: &Arc<Semaphore>) -> Calls {
+    let config = &handler.config;
+    Calls {
+        door,
+        in_flight: handler.calls.clone(),
+        executor: handler.executor.clone(),
+        longest_search: config.budgets.maximum,
+        uploads: builds,
+        reads: Arc::default(),
+        upload_grace: 2 * config.streams.upload_idle,
+        packers: Arc::clone(packers),
+        largest_upload: largest_upload(config),
+        reserve: Arc::clone(&handler.reserve),
+        longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
+    }
 }
 
 async fn set_health(health: &HealthReporter, status: ServingStatus) {

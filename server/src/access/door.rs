@@ -112,12 +112,8 @@ impl Door {
             .map(|peer| format!("{CERTIFICATE}{peer}"))
             .ok_or(ServiceError::TokenMissing)?;
         Ok(tokens.of_certificate(&name).cloned().unwrap_or_else(|| {
-            Arc::new(Identity {
-                name: name.into(),
-                scopes: Scope::ALL.to_vec(),
-                shared: false,
-                quotas: Quotas::default(),
-            })
+            let quotas = Quotas::default();
+            Arc::new(Identity::new(name.into(), Scope::ALL.to_vec(), false, quotas))
         }))
     }
 }

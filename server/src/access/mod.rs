@@ -6,24 +6,43 @@
 mod door;
 mod tokens;
 
-use std::{fmt, sync::Arc};
+use std::{fmt, sync::Arc, time::Duration};
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 pub use self::tokens::new_token;
 pub(crate) use self::{door::Door, tokens::Quotas};
-use crate::error::ServiceError;
+use crate::error::{Quota, ServiceError};
+
+/// When a client at its quota of searches should try again: after about the time of a few.
+const RETRY_SEARCH_AFTER: Duration = Duration::from_millis(50);
 
 /// Who makes a call.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Caller(Option<Arc<Identity>>);
 
 /// A client with a name.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub(crate) struct Identity {
     pub name: Arc<str>,
     pub scopes: Vec<Scope>,
     /// True if what it creates is everybody's.
     pub shared: bool,
     pub quotas: Quotas,
+    /// A permit per search of its quota.
+    searches: Arc<Semaphore>,
+}
+
+impl Identity {
+    fn new(name: Arc<str>, scopes: Vec<Scope>, shared: bool, quotas: Quotas) -> Self {
+        Self {
+            name,
+            scopes,
+            shared,
+            quotas,
+            searches: Arc::new(Semaphore::new(quotas.searches.unwrap_or(0))),
+        }
+    }
 }
 
 /// What a call does; a client may make calls of some kinds only.
@@ -91,6 +110,23 @@ impl Caller {
             .map_or_else(Quotas::default, |identity| identity.quotas)
     }
 
+    /// Takes a search of the caller's quota, if it has one.
+    pub(crate) fn take_search(&self) -> Result<Option<OwnedSemaphorePermit>, ServiceError> {
+        let limited = self
+            .0
+            .as_ref()
+            .and_then(|identity| Some((identity, identity.quotas.searches?)));
+        let Some((identity, most)) = limited else {
+            return Ok(None);
+        };
+        let permit = Arc::clone(&identity.searches).try_acquire_owned();
+        permit.map(Some).map_err(|_| ServiceError::QuotaExceeded {
+            quota: Quota::Searches,
+            maximum: most as u64,
+            retry_after: Some(RETRY_SEARCH_AFTER),
+        })
+    }
+
     /// Checks that the caller may change or delete something with this name and owner.
     pub(crate) fn check_owns(&self, name: &str, owner: &Owner) -> Result<(), ServiceError> {
         let is_own = self.0.is_none() || owner.0.is_none() || owner.0.as_ref() == self.name();
@@ -112,11 +148,7 @@ impl Caller {
     }
 
     pub(crate) fn with(name: &str, quotas: Quotas) -> Self {
-        Self(Some(Arc::new(Identity {
-            name: name.into(),
-            scopes: Scope::ALL.to_vec(),
-            shared: false,
-            quotas,
-        })))
+        let identity = Identity::new(name.into(), Scope::ALL.to_vec(), false, quotas);
+        Self(Some(Arc::new(identity)))
     }
 }

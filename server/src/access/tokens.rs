@@ -17,6 +17,9 @@ const MAX_CLIENTS: usize = 1000;
 /// Longest name of a client, in bytes.
 const MAX_NAME: usize = 64;
 
+/// Largest quota of searches: as many as a server can be configured to admit.
+const MAX_SEARCHES: usize = 256;
+
 /// Start of every secret, by which scanners of leaked secrets know it.
 const SECRET_START: &str = "grasp_";
 
@@ -167,28 +170,28 @@ fn checked(name: &str, entry: Entry, problems: &mut Vec<String>) -> (Identity, V
             )),
         }
     }
-    let zeros = [
-        ("calls_per_second", entry.calls_per_second == Some(0)),
-        ("searches", entry.searches == Some(0)),
-    ];
-    for (key, _) in zeros.iter().filter(|(_, is_zero)| *is_zero) {
-        problems.push(format!("{key} is 0; it must be more, or absent"));
+    if entry.calls_per_second == Some(0) {
+        problems.push("calls_per_second is 0; it must be more, or absent".to_owned());
+    }
+    if let Some(searches) = entry
+        .searches
+        .filter(|searches| !(1..=MAX_SEARCHES).contains(searches))
+    {
+        problems.push(format!(
+            "searches is {searches}; it must be 1 to {MAX_SEARCHES}, or absent"
+        ));
     }
     if entry.shared && (entry.objects.is_some() || entry.bytes.is_some()) {
         let needed = "it must be false with a quota of objects or bytes, which counts what the client owns";
         problems.push(format!("shared is true; {needed}"));
     }
-    let identity = Identity {
-        name: name.into(),
-        scopes: entry.scopes,
-        shared: entry.shared,
-        quotas: Quotas {
-            calls_per_second: entry.calls_per_second.and_then(NonZeroU32::new),
-            searches: entry.searches,
-            objects: entry.objects,
-            bytes: entry.bytes,
-        },
+    let quotas = Quotas {
+        calls_per_second: entry.calls_per_second.and_then(NonZeroU32::new),
+        searches: entry.searches,
+        objects: entry.objects,
+        bytes: entry.bytes,
     };
+    let identity = Identity::new(name.into(), entry.scopes, entry.shared, quotas);
     (identity, hashes)
 }
 

@@ -5,10 +5,11 @@
 
 mod layer;
 mod packing;
+mod reads;
 mod upload;
 
 use std::{
-    sync::{Arc, OnceLock},
+    sync::{Arc, Mutex, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
@@ -26,6 +27,8 @@ use crate::{
     access::Caller,
     budget::DeadlineReserve,
     client::Client,
+    executor::Admission,
+    limits::locked,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
@@ -53,6 +56,8 @@ struct CallRecord {
     due: OnceLock<Instant>,
     /// When it ended.
     ended: OnceLock<Instant>,
+    /// The right to search, until the handler takes it.
+    admission: Mutex<Option<Admission>>,
 }
 
 /// Log record of a search.
@@ -100,6 +105,17 @@ impl CallContext {
             self.client = Client::Named(Arc::clone(name));
         }
         self.caller = caller;
+    }
+
+    /// The right to search that the call came with. Parts of a call have none.
+    pub(crate) fn take_admission(&self) -> Option<Admission> {
+        locked(&self.record.admission).take()
+    }
+
+    /// When a search that takes at most `longest` has to end.
+    pub(crate) fn latest_end(&self, longest: Duration) -> Instant {
+        let latest = self.arrived + longest;
+        self.deadline.map_or(latest, |deadline| deadline.min(latest))
     }
 
     /// When a call that is no search has to be answered, if it has a deadline.

@@ -3,7 +3,7 @@
 //! A status travels in headers, and clients drop calls with large ones: gRPC's C core at random beyond 8 kB. Message and details
 //! of an error take less than 4 kB as they are sent, percent-encoded and in base64, with room for other headers.
 
-use std::{cmp::Reverse, collections::HashMap};
+use std::{cmp::Reverse, collections::HashMap, time::Duration};
 
 use grasp_proto::v1::ErrorReason;
 use http::Response;
@@ -65,11 +65,7 @@ impl From<ServiceError> for Status {
                 details.add_precondition_failure_violation(kind, name, text);
             }
         }
-        let retry_after = match error {
-            E::Overloaded { retry_after, .. } => Some(retry_after),
-            E::QuotaExceeded { retry_after, .. } => retry_after,
-            _ => None,
-        };
+        let retry_after = retry_after(&error);
         if retry_after.is_some() {
             details.set_retry_info(retry_after);
         }
@@ -83,6 +79,16 @@ impl From<ServiceError> for Status {
             status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
         }
         status
+    }
+}
+
+/// When a client should try again, if the server had no room for its call.
+fn retry_after(error: &E) -> Option<Duration> {
+    match error {
+        E::Overloaded { retry_after, .. } => Some(*retry_after),
+        E::WouldMissDeadline { expected } => Some(*expected),
+        E::QuotaExceeded { retry_after, .. } => *retry_after,
+        _ => None,
     }
 }
 
@@ -107,6 +113,7 @@ fn code_and_reason(error: &E) -> (Code, ErrorReason) {
         E::RigsFull { .. } | E::RigShareFull { .. } => (Code::ResourceExhausted, R::TooManyRigs),
         E::StoreFailed => (Code::Unavailable, R::StoreFailed),
         E::Overloaded { limit, .. } => (Code::ResourceExhausted, limit.text_and_reason().1),
+        E::WouldMissDeadline { .. } => (Code::ResourceExhausted, R::WouldMissDeadline),
         // As the transport answers to messages beyond its own limit.
         E::MessageTooLarge { .. } => (Code::OutOfRange, R::MessageTooLarge),
         E::ReaderStalled { .. } => (Code::DeadlineExceeded, R::ReaderStalled),

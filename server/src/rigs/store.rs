@@ -8,6 +8,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use grasp_admission::may_hold_another;
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1;
 use grasp_synthesis::model::hand::{Handedness, rig::Rig};
@@ -18,7 +19,6 @@ use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
     access::{Caller, Owner},
     error::ServiceError,
-    limits::may_hold_another,
     saved::{FieldMove, RIGS, Records, SavedFiles, Unreadable, field, message, move_fields, seal, wait_for},
 };
 

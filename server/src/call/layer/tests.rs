@@ -69,6 +69,9 @@ fn admitting_one() -> Calls {
     Calls {
         door: Arc::new(Door::open(None, false).unwrap()),
         in_flight: watch::Sender::new(()),
+        executor: SearchExecutor::new(1, 8).expect("a thread starts"),
+        longest_search: Duration::from_secs(10),
+        reads: Arc::default(),
         uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),
         reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
