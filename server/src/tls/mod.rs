@@ -130,6 +130,9 @@ fn load(files: &TlsFiles) -> Result<Current, Vec<String>> {
     });
     let clients = files.client_ca.as_ref().map(|path| {
         let authorities = certificates("tls_client_ca", path, &mut problems);
+        if authorities.is_empty() {
+            return Err(());
+        }
         let verifier = client_verifier(authorities);
         verifier.map_err(|reason| problems.push(wrong("tls_client_ca", path, reason)))
     });
