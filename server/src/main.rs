@@ -14,7 +14,7 @@ use futures_util::future::select_all;
 use grasp_server::{
     Config, ConfigError, ListenAddress, Listener, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
-    is_reserved_memory_limited, new_token, warn_of_memory,
+    fit_open_files, is_reserved_memory_limited, new_token, warn_of_memory,
 };
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::{
@@ -102,7 +102,7 @@ fn start(flags: &Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
         eprintln!("{secret}");
         return Ok(ExitCode::SUCCESS);
     }
-    let (values, config) = configuration(flags)?;
+    let (values, mut config) = configuration(flags)?;
     if flags.print_config {
         print!("{}", toml::to_string(&values)?);
         return Ok(ExitCode::SUCCESS);
@@ -119,6 +119,7 @@ fn start(flags: &Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
     if let Err(error) = arenas {
         tracing::warn!(%error, "cannot start again with fewer arenas: allocations may fail below the limit of reserved memory");
     }
+    fit_open_files(&mut config);
     let json = config.log_format == LogFormat::Json;
     let rereading = Rereading {
         flags,

@@ -2,7 +2,9 @@
 
 mod access;
 mod atlases;
+mod attacks;
 mod connect;
+mod connections;
 mod conventions;
 mod examples;
 mod find_grasp;
@@ -11,6 +13,7 @@ mod golden;
 mod known_grips;
 mod load;
 mod module_order;
+mod network;
 mod objects;
 mod own_hands;
 mod real_input;

@@ -32,7 +32,7 @@ const SERVER: &[&[&str]] = &[
     ],
     &["rigs"],
     &["answer", "call", "config", "validate"],
-    &["connect", "memory", "objects", "track"],
+    &["connect", "memory", "objects", "open_files", "track"],
     &["atlases"],
     &["search"],
     &["services"],
