@@ -129,5 +129,5 @@ pub(crate) async fn keep_current(mut watched: Vec<Watched>, reloader: Reloader) 
         watched = back;
     }
     // A panic, which the log has. The server goes on with what it has read.
-    std::future::pending().await
+    std::future::pending::<()>().await;
 }

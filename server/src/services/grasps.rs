@@ -66,13 +66,12 @@ impl Handler {
         query: FindQuery,
         call: &CallContext,
     ) -> Result<(Admission, FindJob), ServiceError> {
-        let admission = match call.take_admission() {
-            Some(admission) => admission,
-            None => {
-                let own = call.caller.take_search()?;
-                let due = call.latest_end(self.config.budgets.maximum);
-                self.executor.admit(&call.client, due)?.within(own)
-            }
+        let admission = if let Some(admission) = call.take_admission() {
+            admission
+        } else {
+            let own = call.caller.take_search()?;
+            let due = call.latest_end(self.config.budgets.maximum);
+            self.executor.admit(&call.client, due)?.within(own)
         };
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;

@@ -30,8 +30,9 @@ pub(super) fn holder(certificate: &CertificateDer<'_>) -> Option<String> {
     let name = common_name.filter(|name| !name.is_empty()).or_else(|| {
         let (_, SubjectAltName(names)) = certificate.get_extension().ok()??;
         names.into_iter().find_map(|name| match name {
-            GeneralName::DnsName(name) | GeneralName::Rfc822Name(name) => Some(name.to_string()),
-            GeneralName::UniformResourceIdentifier(name) => Some(name.to_string()),
+            GeneralName::DnsName(name)
+            | GeneralName::Rfc822Name(name)
+            | GeneralName::UniformResourceIdentifier(name) => Some(name.to_string()),
             _ => None,
         })
     });
