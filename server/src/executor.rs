@@ -11,6 +11,7 @@ use std::{
 use grasp_admission::{Gate, Job, TooLate};
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     client::Client,
@@ -41,9 +42,16 @@ pub(crate) struct SearchExecutor {
 pub(crate) struct Admission {
     job: Arc<Job<Client>>,
     _place: Place,
+    /// Of the client's own quota.
+    _own: Option<OwnedSemaphorePermit>,
 }
 
 impl Admission {
+    /// The same within a client's quota.
+    pub(crate) fn within(self, own: Option<OwnedSemaphorePermit>) -> Self {
+        Self { _own: own, ..self }
+    }
+
     /// Sets when the job has to end, and whether it goes on as long as there is time, for which others do not wait.
     pub(crate) fn set_due(&self, due: Instant, yields: bool) {
         self.job.set_due(due, yields);
@@ -117,6 +125,7 @@ impl SearchExecutor {
         Ok(Admission {
             job: Arc::new(job),
             _place: place,
+            _own: None,
         })
     }
 

@@ -26,6 +26,7 @@ use tonic_web::GrpcWebLayer;
 use tower::{ServiceBuilder, util::option_layer};
 
 use crate::{
+    access::Door,
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
     call::{BySize, Calls},
@@ -43,9 +44,11 @@ use crate::{
         saved::SavedObjects,
         store::ObjectStore,
     },
+    reload::{Reloader, Watched, keep_current},
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
+    tls::Tls,
     track::OpenTracks,
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
@@ -80,6 +83,9 @@ pub enum ServeError {
         /// The cause.
         source: std::io::Error,
     },
+    /// Files of certificates or tokens cannot be used.
+    #[error("{}", .0.join("\n"))]
+    Secrets(Vec<String>),
     /// The builder threads cannot be started.
     #[error("cannot start the atlas builders: {0}")]
     Builders(std::io::Error),
@@ -93,6 +99,9 @@ pub enum ServeError {
 pub struct Server {
     handler: Handler,
     builds: Places,
+    tls: Option<Arc<Tls>>,
+    door: Arc<Door>,
+    reloader: Reloader,
 }
 
 /// The server's activity, for tests and monitoring.
@@ -150,6 +159,18 @@ impl Server {
     /// # Errors
     /// See [`ServeError`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
+        let tls = config.tls.clone().map(Tls::open).transpose();
+        let takes_certificates = config.tls.as_ref().is_some_and(|tls| tls.client_ca.is_some());
+        let door = Door::open(config.tokens_file.clone(), takes_certificates);
+        let (tls, door) = match (tls, door) {
+            (Ok(tls), Ok(door)) => (tls.map(Arc::new), Arc::new(door)),
+            (tls, door) => {
+                let problems = [tls.err(), door.err()];
+                return Err(ServeError::Secrets(
+                    problems.into_iter().flatten().flatten().collect(),
+                ));
+            }
+        };
         prepare_hands();
         let directory = match &config.objects_directory {
             Some(path) => {
@@ -217,6 +238,9 @@ impl Server {
         Ok(Self {
             handler: Handler(Arc::new(shared)),
             builds,
+            tls,
+            door,
+            reloader: Reloader::default(),
         })
     }
 
@@ -242,6 +266,11 @@ impl Server {
     /// The server's activity.
     pub fn gauges(&self) -> Gauges {
         Gauges(self.handler.clone())
+    }
+
+    /// Makes the server read its certificates and tokens again.
+    pub fn reloader(&self) -> Reloader {
+        self.reloader.clone()
     }
 
     /// Serves on one or more listeners, which share all limits; see [`run`].
@@ -277,7 +306,13 @@ impl Server {
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
         self.read_saved().await?;
-        let Self { handler, builds } = self;
+        let Self {
+            handler,
+            builds,
+            tls,
+            door,
+            reloader,
+        } = self;
         let config = &handler.config;
         let largest_upload = largest_upload(config);
         let grasps = GraspServiceServer::new(handler.clone())
@@ -320,7 +355,7 @@ impl Server {
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(Around(calls(&handler, builds, &packers)))
+            .layer(Around(calls(&handler, Arc::clone(&door), builds, &packers)))
             .layer(Around(Transcoding {
                 largest_upload,
                 places: packers,
@@ -328,6 +363,7 @@ impl Server {
             .service(routes.prepare());
         let serving = Serving {
             service,
+            tls: tls.clone(),
             lifetime: Lifetime {
                 idle: config.connection_idle,
                 age: config.connection_age,
@@ -341,6 +377,8 @@ impl Server {
         let _builders_end = handler.atlases.stopper();
         let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
+        let mut watched = vec![Watched::new(door)];
+        watched.extend(tls.map(|tls| Watched::new(tls)));
         let shutting_down = async {
             shutdown.await;
             tracing::info!(calls = handler.calls.receiver_count(), "draining");
@@ -360,6 +398,7 @@ impl Server {
         tokio::select! {
             () = serving => {}
             () = handler.connections.close_stalled() => {}
+            () = keep_current(watched, reloader) => {}
             () = shutting_down => {}
         }
         tracing::info!("stopped");
@@ -404,9 +443,10 @@ fn largest_upload(config: &Config) -> usize {
     config.maximum_object_bytes.get() + BYTES_BESIDES_MESH
 }
 
-fn calls(handler: &Handler, builds: Places, packers: &Arc<Semaphore>) -> Calls {
+fn calls(handler: &Handler, door: Arc<Door>, builds: Places, packers: &Arc<Semaphore>) -> Calls {
     let config = &handler.config;
     Calls {
+        door,
         in_flight: handler.calls.clone(),
         executor: handler.executor.clone(),
         longest_search: config.budgets.maximum,

@@ -7,7 +7,7 @@ use grasp_proto::v1::{
     self, grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
     object_service_client::ObjectServiceClient,
 };
-use grasp_server::{Config, Gauges, ServeError, Server, config::StorePlace};
+use grasp_server::{Config, Gauges, Reloader, ServeError, Server, config::StorePlace};
 use grasp_synthesis::base::pose::Pose;
 use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
@@ -20,7 +20,9 @@ const WORKERS: usize = 2;
 #[derive(Debug)]
 pub struct TestServer {
     address: SocketAddr,
+    scheme: &'static str,
     gauges: Gauges,
+    reloader: Reloader,
     stop: DropGuard,
     serving: JoinHandle<Result<(), ServeError>>,
 }
@@ -49,13 +51,16 @@ impl TestServer {
             .await
             .expect("a free port of this machine");
         let address = listener.local_addr().expect("a bound socket has an address");
+        let scheme = if config.tls.is_some() { "https" } else { "http" };
         let server = Server::new(config).expect("the server starts");
-        let gauges = server.gauges();
+        let (gauges, reloader) = (server.gauges(), server.reloader());
         let stop = CancellationToken::new();
         let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));
         Self {
             address,
+            scheme,
             gauges,
+            reloader,
             stop: stop.drop_guard(),
             serving,
         }
@@ -68,12 +73,17 @@ impl TestServer {
 
     /// The address as a client's endpoint.
     pub fn endpoint(&self) -> String {
-        format!("http://{}", self.address)
+        format!("{}://{}", self.scheme, self.address)
     }
 
     /// Its gauges.
     pub fn gauges(&self) -> &Gauges {
         &self.gauges
+    }
+
+    /// What makes it read its certificates again.
+    pub fn reloader(&self) -> &Reloader {
+        &self.reloader
     }
 
     /// A new connection.

@@ -8,6 +8,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use grasp_admission::may_hold_another;
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1;
 use grasp_synthesis::model::hand::{Handedness, rig::Rig};
@@ -16,6 +17,7 @@ use prost::Message;
 
 use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
+    access::{Caller, Owner},
     error::ServiceError,
     saved::{FieldMove, RIGS, Records, SavedFiles, Unreadable, field, message, move_fields, seal, wait_for},
 };
@@ -106,16 +108,38 @@ impl RigStore {
         Ok(())
     }
 
+    /// Checks that an owner may have another rig, beside those of others. Everybody's rigs are limited only together.
+    pub(crate) fn check_share(&self, owner: &Owner) -> Result<(), ServiceError> {
+        let created = self.created();
+        let own = created.values().flatten().filter(|rig| rig.owner == *owner);
+        let (held, free) = (own.count(), self.maximum.saturating_sub(created.len()));
+        if owner.is_everybody() || may_hold_another(held, free) {
+            return Ok(());
+        }
+        Err(ServiceError::RigShareFull {
+            held,
+            maximum: self.maximum,
+        })
+    }
+
+    /// Checks that a rig, if it exists, does not belong to another client.
+    pub(crate) fn check_owned(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
+        let created = self.created();
+        let rig = created.get(id).and_then(Option::as_ref);
+        rig.map_or(Ok(()), |rig| caller.check_owns(&rig.name(), &rig.owner))
+    }
+
     /// The records; `None` if rigs are in memory only.
     pub(crate) fn saved(&self) -> Option<&Records> {
         self.saved.as_ref()
     }
 
-    /// The record of the rig that this request makes. `None` if rigs are in memory only.
-    pub(crate) fn record(&self, request: &v1::CreateRigRequest) -> Option<Bytes> {
+    /// The record of the rig that this request of its owner makes. `None` if rigs are in memory only.
+    pub(crate) fn record(&self, request: &v1::CreateRigRequest, owner: &Owner) -> Option<Bytes> {
         let record = |_: &Records| {
             seal(&SavedRig {
                 request: Some(request.clone()),
+                owner: owner.to_string(),
             })
         };
         self.saved.as_ref().map(record)
@@ -129,6 +153,7 @@ impl RigStore {
     ) -> Result<Arc<StoredRig>, ServiceError> {
         let _changing = self.changing();
         self.check_room(&rig.id)?;
+        self.check_share(&rig.owner)?;
         if let Some((saved, record)) = self.saved.as_ref().zip(record) {
             let mut names = self.ids();
             names.push(rig.id.clone());
@@ -207,6 +232,7 @@ fn built_in(name: &str) -> Option<StoredRig> {
     Some(StoredRig {
         id: name.to_owned(),
         built_in: true,
+        owner: Owner::default(),
         hands: [hand(Handedness::Left)?, hand(Handedness::Right)?],
         mirrored: [true, false],
         warnings: Vec::new(),
@@ -220,15 +246,16 @@ pub(crate) fn saved_rigs(files: Arc<SavedFiles>) -> Records {
     Records::new(files, RIGS, MAX_RECORD)
 }
 
-/// The request that made a rig. The inner error is why its record cannot be read.
+/// The request that made a rig, and its owner. The inner error is why its record cannot be read.
 pub(crate) async fn saved_request(
     rigs: &Records,
     id: &str,
-) -> Result<Result<v1::CreateRigRequest, Unreadable>, Error> {
+) -> Result<Result<(v1::CreateRigRequest, Owner), Unreadable>, Error> {
     let parse = |message: &[u8]| {
         let request = request_of(message).ok_or(Unreadable::Message)?;
         if request.rig_id == id {
-            Ok(request)
+            let owner = SavedRig::decode(message).map(|saved| Owner::named(&saved.owner));
+            Ok((request, owner.unwrap_or_default()))
         } else {
             Err(Unreadable::Name)
         }
@@ -242,6 +269,9 @@ struct SavedRig {
     /// `None` in records of version 0.1.
     #[prost(message, optional, tag = "10")]
     request: Option<v1::CreateRigRequest>,
+    /// The name of the client that created it; empty if it is everybody's.
+    #[prost(string, tag = "11")]
+    owner: String,
 }
 
 /// The places of a version 0.1 record's fields in a request.
@@ -306,6 +336,38 @@ mod tests {
         store.insert(rig("c"), None).unwrap();
         let listed: Vec<String> = store.page(None, 10).0.iter().map(|rig| rig.id.clone()).collect();
         assert_eq!(listed, ["adult", "b", "c", "thesis"]);
+    }
+
+    #[test]
+    fn an_owner_leaves_room_for_others_and_others_leave_its_rigs_alone() {
+        let store = RigStore::new(16, None);
+        let one = Caller::named("one");
+        let own = |id: String, caller: &Caller| StoredRig {
+            owner: caller.owner(),
+            ..rig(&id)
+        };
+        let fill = |caller: &Caller, name: &str| {
+            let added = |number: &u32| store.insert(own(format!("{name}{number}"), caller), None).is_ok();
+            (0..20).take_while(added).count()
+        };
+        assert_eq!(fill(&one, "one"), 12);
+        assert_eq!(fill(&Caller::named("two"), "two"), 3);
+        let theirs = ServiceError::NotOwner {
+            name: name_of("one0"),
+            owner: "one".to_owned(),
+        };
+        assert_eq!(store.check_owned("one0", &Caller::named("two")), Err(theirs));
+        assert_eq!(store.check_owned("one0", &one), Ok(()));
+        assert_eq!(
+            store.check_owned("one0", &Caller::default()),
+            Ok(()),
+            "without tokens, it is everybody's"
+        );
+        assert_eq!(
+            fill(&Caller::default(), "all"),
+            1,
+            "nothing is kept for others then"
+        );
     }
 
     #[test]

@@ -71,11 +71,12 @@ impl Handler {
         query: FindQuery,
         call: &CallContext,
     ) -> Result<(Admission, FindJob), ServiceError> {
-        let admission = match call.take_admission() {
-            Some(admission) => admission,
-            None => self
-                .executor
-                .admit(&call.client, call.latest_end(self.config.budgets.maximum))?,
+        let admission = if let Some(admission) = call.take_admission() {
+            admission
+        } else {
+            let own = call.caller.take_search()?;
+            let due = call.latest_end(self.config.budgets.maximum);
+            self.executor.admit(&call.client, due)?.within(own)
         };
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;
@@ -240,7 +241,8 @@ impl GraspService for Handler {
     }
 
     async fn delete_track(&self, request: Request<v1::DeleteTrackRequest>) -> Result<Response<()>, Status> {
-        self.tracks.delete(&request.into_inner().name).await?;
+        let caller = CallContext::of(&request).caller;
+        self.tracks.delete(&request.into_inner().name, &caller).await?;
         Ok(Response::new(()))
     }
 

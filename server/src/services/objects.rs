@@ -20,6 +20,7 @@ use crate::{
         Listed,
         build::{build_object, changed},
         given::check_grips,
+        name_of,
         store::Origin,
     },
     validate::{
@@ -54,11 +55,12 @@ impl Handler {
             labels: std::mem::take(&mut fields.labels),
             request: fields.request,
             mesh: Bytes::new(),
+            caller: call.caller.clone(),
         };
         if violations.is_empty() {
             call.log_object(&fields.id);
             // Checked again on insertion; checked here to avoid building the object in vain.
-            if let Some(object) = self.objects.repeated(&fields.id, origin.request.as_ref())? {
+            if let Some(object) = self.objects.repeated(&fields.id, &origin)? {
                 return Ok(object);
             }
         }
@@ -100,6 +102,7 @@ impl Handler {
         let objects = &self.objects;
         objects.found(&query.id).await?;
         let base = objects.changeable(&query.id, query.etag.as_deref())?;
+        call.caller.check_owns(&name_of(&query.id), &base.record.owner)?;
         query.check_immutable(&base.to_wire())?;
         // Changing labels does not need the object.
         let object = if query.change.is_empty() {
@@ -291,7 +294,11 @@ impl ObjectService for Handler {
         let id = checked_id(&request.name, object_id_of)?;
         call.log_object(&id);
         let etag = given_etag(request.etag);
-        let remove = move |shared: &Shared| shared.objects.remove(&id, etag.as_deref());
+        let remove = move |shared: &Shared| {
+            // No other deletion runs meanwhile.
+            shared.objects.check_owned(&id, &call.caller)?;
+            shared.objects.remove(&id, etag.as_deref())
+        };
         match self.delete_in_turn(remove).await {
             Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
             result => result?,

@@ -77,7 +77,9 @@ impl Handler {
     ) -> Result<v1::Track, ServiceError> {
         let started = self.start(track.clone(), true, call).await?;
         let inbox = Arc::clone(&started.inbox);
-        let name = self.tracks.open(inbox, started.answer_pushed());
+        let name = self
+            .tracks
+            .open(call.caller.owner(), inbox, started.answer_pushed());
         Ok(v1::Track { name, ..track })
     }
 
@@ -90,7 +92,7 @@ impl Handler {
         let (reply, answer) = oneshot::channel();
         // Does not hold the track while it waits.
         put(
-            &*self.tracks.inbox(&name)?,
+            &*self.tracks.inbox(&name, &call.caller)?,
             frame,
             call.clone(),
             Some(reply),

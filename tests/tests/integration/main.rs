@@ -1,5 +1,6 @@
 //! The server over real gRPC, in one binary that is linked once.
 
+mod access;
 mod atlases;
 mod attacks;
 mod connect;
@@ -19,6 +20,7 @@ mod real_input;
 mod reported;
 mod saved;
 mod saved_by_0_1;
+mod secure;
 mod standard;
 mod streams;
 mod tracks;

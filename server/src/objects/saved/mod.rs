@@ -30,6 +30,7 @@ use uuid::Uuid;
 
 use super::{Record, StoredObject, id_of, name_of};
 use crate::{
+    access::Owner,
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
     saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, seal},
@@ -277,6 +278,7 @@ impl SavedObject {
     pub(crate) fn description(self) -> v1::GraspObject {
         v1::GraspObject {
             labels: Labels::new(),
+            owner: String::new(),
             etag: String::new(),
             ..self.without_lists().object
         }
@@ -286,6 +288,7 @@ impl SavedObject {
     pub(crate) fn record(&self) -> Option<Record> {
         Some(Record {
             labels: self.object.labels.clone(),
+            owner: Owner::named(&self.object.owner),
             etag: self.object.etag.clone(),
             created: SystemTime::try_from(self.object.create_time?).ok()?,
             updated: SystemTime::try_from(self.object.update_time?).ok()?,
@@ -305,6 +308,11 @@ impl SavedObject {
             id: Uuid::from_slice(&self.request_id).ok()?,
             content: self.request_content.as_slice().try_into().ok()?,
         })
+    }
+
+    /// Size of the mesh file in bytes.
+    pub(crate) fn mesh_bytes(&self) -> u64 {
+        self.mesh_bytes
     }
 
     /// SHA-256 of the mesh file.
