@@ -16,6 +16,7 @@ use grasp_server::{
     config::{LogFormat, RawConfig, read_file, unknown_variables},
     is_reserved_memory_limited, warn_of_memory,
 };
+use rustix::fs::Mode;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::{filter::Targets, fmt, layer::SubscriberExt as _, util::SubscriberInitExt as _};
 
@@ -93,6 +94,8 @@ fn start(mut flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
         runtime.block_on(check_health(&config.listen))?;
         return Ok(ExitCode::SUCCESS);
     }
+    // Files of the store are private from their first moment, even where a library creates them.
+    rustix::process::umask(Mode::RWXG | Mode::RWXO);
     let arenas = limit_arenas();
     start_log(&config)?;
     if let Err(error) = arenas {

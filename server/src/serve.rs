@@ -193,11 +193,13 @@ impl Server {
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let atlas_files = match config.kept_atlases() {
             Some(path) => {
-                let opened = AtlasFiles::open(path.clone(), config.atlas_directory.is_none());
+                let opened = AtlasFiles::open(path.clone());
                 Some(opened.map_err(|source| ServeError::AtlasDirectory { path, source })?)
             }
             None => None,
         };
+        let models = config.maximum_object_bytes.get();
+        let rig_records = files.map(|files| saved_rigs(files, models));
         let builds = Places::new(Limit::Uploads, config.maximum_uploads.get(), RETRY_UPLOAD_AFTER);
         let shared = Shared {
             atlases: Atlases::start(
@@ -209,7 +211,7 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
+            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), rig_records)),
             resizer: Resizer(Arc::clone(&builds.free)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(

@@ -12,14 +12,22 @@ use super::{SavedFiles, StoreError, log_failure};
 /// Length of the hash before the message.
 const HASH_BYTES: usize = 32;
 
-/// Largest file of names, in bytes.
-const MAX_NAMES: u64 = 1 << 30;
+/// Most names in a file of names: as many as a server can be configured to keep.
+const MAX_NAMES: usize = 1_000_000;
+
+/// Longest name, in bytes.
+const MAX_NAME: usize = 63;
+
+/// Largest file of names, in bytes: each with the number of its field and its length.
+const MAX_NAMES_BYTES: u64 = (MAX_NAMES * (MAX_NAME + 2) + HASH_BYTES) as u64;
 
 /// Why a record cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unreadable {
     #[error("its file is missing")]
     Missing,
+    #[error("its file has more bytes than the server's limits allow")]
+    Size,
     #[error("its SHA-256 does not match its content")]
     Hash,
     #[error("its content is not a record of this version")]
@@ -57,6 +65,25 @@ pub(crate) struct Records {
 struct Names {
     #[prost(string, repeated, tag = "1")]
     names: Vec<String>,
+}
+
+/// The names of a message. `None` if it is not one, or has too many or too long ones: read one by one, a forged message takes no more
+/// memory than a right one.
+fn names_of(mut message: &[u8]) -> Option<BTreeSet<String>> {
+    const KEY: usize = 1 << 3 | 2;
+    let mut names = BTreeSet::new();
+    while !message.is_empty() {
+        let key = decode_length_delimiter(&mut message).ok()?;
+        let length = decode_length_delimiter(&mut message).ok()?;
+        let (name, rest) = message.split_at_checked(length)?;
+        let is_name = key == KEY && (1..=MAX_NAME).contains(&length);
+        if !is_name || names.len() == MAX_NAMES {
+            return None;
+        }
+        names.insert(str::from_utf8(name).ok()?.to_owned());
+        message = rest;
+    }
+    Some(names)
 }
 
 #[derive(Debug)]
@@ -152,15 +179,15 @@ impl Records {
 
     /// The names that were last written; empty if they never were, or cannot be read.
     async fn names(&self) -> Result<BTreeSet<String>, Error> {
-        let parse = |message: &[u8]| Names::decode(message).map_err(|_| Unreadable::Message);
+        let parse = |message: &[u8]| names_of(message).ok_or(Unreadable::Message);
         let file = self.names_path();
-        let read = self.read_file(&file, MAX_NAMES, parse).await?;
+        let read = self.read_file(&file, MAX_NAMES_BYTES, parse).await?;
         if let Err(wrong) = read
             && wrong != Unreadable::Missing
         {
             tracing::error!(%file, %wrong, "the names of what is saved are damaged: what is missing will not be missed");
         }
-        Ok(read.unwrap_or_default().names.into_iter().collect())
+        Ok(read.unwrap_or_default())
     }
 
     async fn write_names(&self, names: Vec<String>) -> Result<(), Error> {
@@ -174,8 +201,7 @@ impl Records {
         parse: impl FnOnce(&[u8]) -> Result<T, Unreadable>,
     ) -> Result<Result<T, Unreadable>, Error> {
         let bytes = self.files.read(path, max_bytes).await?;
-        let message = bytes.as_deref().ok_or(Unreadable::Missing).and_then(unsealed);
-        Ok(message.and_then(parse))
+        Ok(bytes.and_then(|bytes| parse(unsealed(&bytes)?)))
     }
 
     fn path(&self, id: &str) -> Path {
@@ -264,7 +290,10 @@ mod tests {
             names: vec!["mug".to_owned(), "a longer name".to_owned()],
         };
         let bytes = seal(&names);
-        assert_eq!(Names::decode(unsealed(&bytes).unwrap()), Ok(names));
+        assert_eq!(
+            names_of(unsealed(&bytes).unwrap()),
+            Some(names.names.into_iter().collect())
+        );
         for place in 0..bytes.len() {
             for flipped in [0x01, 0x80, 0xff] {
                 let mut damaged = bytes.to_vec();

@@ -1,13 +1,14 @@
-//! The binary: exit codes, messages, signals, health checks, and memory limits.
+//! The binary: exit codes, messages, signals, health checks, kills, and memory.
 #![cfg(target_os = "linux")]
 
+mod kills;
 mod stress;
 
 use std::{
     fs,
     io::{BufRead, BufReader},
     net::{Ipv4Addr, TcpListener},
-    path::Path,
+    path::{Path, PathBuf},
     process::{Child, ChildStderr, Command, Stdio},
 };
 
@@ -94,6 +95,25 @@ impl Drop for Running {
         // It has already ended unless the test failed.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// A test's own folder, absent at first and removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn absent(test: &str) -> Self {
+        Self(std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id())))
+    }
+
+    fn path(&self) -> &str {
+        self.0.to_str().expect("the path is text")
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
     }
 }
 

@@ -1,5 +1,7 @@
 //! Objects and rigs that are saved outlast the server, however it ends, and their time in memory.
 
+mod damage;
+
 use std::{fs, time::Duration};
 
 use grasp_proto::v1;
@@ -9,8 +11,8 @@ use tonic::{Code, Status};
 
 use crate::{
     fixtures::{
-        Folder, assert_status, bounded, box_request, create, delete, floating_remote, forbidden, get, labels,
-        list, mesh, reason, reproducible, update, update_of, with_object,
+        BOX_OBJ, Folder, assert_status, bounded, box_request, create, delete, floating_remote, forbidden,
+        get, labels, list, mesh, reason, reproducible, sha256, update, update_of, with_object,
     },
     own_hands::{new_rig, right_hand_of},
 };

@@ -183,7 +183,7 @@ impl SavedObjects {
     }
 
     /// The mesh file of an object, to be compared with its hash, and room for it until the permit is dropped. `None` if it is
-    /// missing. [`ServiceError::ObjectUnloadable`] if it is too large.
+    /// missing or too long. [`ServiceError::ObjectUnloadable`] if it is too large.
     pub(crate) async fn mesh(
         &self,
         saved: &SavedObject,
@@ -198,10 +198,8 @@ impl SavedObjects {
         let permits = (bytes as usize).div_ceil(BYTES_PER_PERMIT) as u32;
         let acquired = Arc::clone(&self.load_bytes).acquire_many_owned(permits).await;
         let room = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        Ok((
-            self.files.read(&mesh_path(&saved.mesh_hash()), bytes).await?,
-            room,
-        ))
+        let read = self.files.read(&mesh_path(&saved.mesh_hash()), bytes).await?;
+        Ok((read.ok(), room))
     }
 }
 
