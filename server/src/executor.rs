@@ -4,17 +4,19 @@
 //! workers' threads are named `grasp-search-N` and shared by all jobs.
 
 use std::{
+    panic::AssertUnwindSafe,
     sync::Arc,
     time::{Duration, Instant},
 };
 
+use futures_util::FutureExt as _;
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     error::{Limit, ServiceError},
-    limits::Places,
+    faults::{FaultPoint, Faults},
+    limits::{Place, Places},
 };
 
 /// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond
@@ -27,12 +29,13 @@ const RETRY_AFTER: Duration = Duration::from_millis(50);
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
+    pub faults: Faults,
     /// A place per running or waiting job.
     pub places: Places,
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
-pub(crate) type Admission = OwnedSemaphorePermit;
+pub(crate) type Admission = Place;
 
 impl SearchExecutor {
     /// A pool of `workers` threads that admits up to `maximum` jobs.
@@ -45,6 +48,7 @@ impl SearchExecutor {
             .build()?;
         Ok(Self {
             pool: Arc::new(pool),
+            faults: Faults::default(),
             places: Places::new(Limit::Searches, maximum, RETRY_AFTER),
         })
     }
@@ -59,11 +63,18 @@ impl SearchExecutor {
         admission: Admission,
         job: impl FnOnce(&ThreadPool, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let pool = Arc::clone(&self.pool);
+        let (pool, faults) = (Arc::clone(&self.pool), self.faults.clone());
         run_stoppable(None, move |stop| {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
             let _admission = admission;
-            job(&pool, stop)
+            faults.at(FaultPoint::Coordinator);
+            let is_over = || {
+                if rayon::current_thread_index().is_some() {
+                    faults.at(FaultPoint::Worker);
+                }
+                stop.is_over()
+            };
+            job(&pool, Stop::when(&is_over))
         })
         .await
     }
@@ -96,6 +107,14 @@ pub(crate) async fn before<T>(
     }
 }
 
+/// The output of a future, or [`ServiceError::Panicked`]. For work whose values are dropped after a panic.
+pub(crate) async fn contained<T>(
+    future: impl Future<Output = Result<T, ServiceError>>,
+) -> Result<T, ServiceError> {
+    let output = AssertUnwindSafe(future).catch_unwind().await;
+    output.unwrap_or(Err(ServiceError::Panicked))
+}
+
 /// Runs blocking work away from the threads of the async runtime.
 pub(crate) async fn run_blocking<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
@@ -115,22 +134,23 @@ mod tests {
     use std::thread;
 
     use super::*;
+    use crate::client::Client;
 
     #[tokio::test]
     async fn panic_in_a_worker_ends_only_its_own_job() {
-        let executor = SearchExecutor::new(2, 4).expect("threads start");
+        let executor = SearchExecutor::new(2, 8).expect("threads start");
         for _ in 0..8 {
-            let bad = executor.run(executor.places.take().unwrap(), |pool, _| {
+            let bad = executor.run(executor.places.take(&Client::Local).unwrap(), |pool, _| {
                 pool.in_place_scope(|scope| {
                     scope.spawn(|_| panic!("on purpose"));
                     scope.spawn(|_| {});
                 });
             });
-            let good = executor.run(executor.places.take().unwrap(), |_, _| 7);
+            let good = executor.run(executor.places.take(&Client::Local).unwrap(), |_, _| 7);
             assert_eq!(tokio::join!(bad, good), (Err(ServiceError::Panicked), Ok(7)));
         }
         let threads = executor
-            .run(executor.places.take().unwrap(), |pool, _| {
+            .run(executor.places.take(&Client::Local).unwrap(), |pool, _| {
                 pool.broadcast(|_| thread::current().name().map(str::to_owned))
             })
             .await

@@ -7,7 +7,7 @@
 //! `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and stops it when the call is
 //! dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages go through
 //! `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next. `budget` says how long a search
-//! may take, and how much of a deadline recent delays leave for it.
+//! may take, and how much of a deadline recent delays leave for it. `limits` shares places between clients, which `client` tells apart.
 //!
 //! `wire` converts single values of the contract, `middleware` is the form of layers around services. `web` lets pages in browsers
 //! call, and refuses pages of other origins and protocols other than gRPC, gRPC-Web and Connect, which `connect` turns into gRPC.
@@ -18,16 +18,16 @@
 //!
 //! Before serving, `memory` compares the configured limits with those of the process, and `objects::directory` loads the folder
 //! of objects. Between calls, `atlases` builds atlases in the background.
-//! `health_check` is a client: it asks a running server for its health.
+//! `health_check` is a client: it asks a running server for its health. `faults` are those that tests inject.
 //!
 //! # Order of modules
 //!
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  error  listen  middleware  wire
-//! health_check  limits  viewer
-//! atlas_slots  net  saved  web
+//! budget  client  convention  error  faults  middleware  wire
+//! limits  listen  viewer
+//! atlas_slots  health_check  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
 //! connect  memory  objects  track
@@ -46,11 +46,13 @@ mod atlas_slots;
 mod atlases;
 mod budget;
 mod call;
+mod client;
 pub mod config;
 mod connect;
 mod convention;
 mod error;
 mod executor;
+mod faults;
 mod health_check;
 mod limits;
 mod listen;
@@ -71,6 +73,8 @@ mod wire;
 
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
+#[doc(hidden)]
+pub use faults::FaultPoint;
 pub use health_check::check_health;
 pub use limits::{StoreLimits, StreamLimits};
 pub use listen::{ListenAddress, Listener};

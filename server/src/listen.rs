@@ -11,6 +11,8 @@ use std::{
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 use tokio_util::either::Either;
 
+use crate::client::Client;
+
 /// Values of the setting `listen`, for errors.
 pub(crate) const NEEDED_LISTEN: &str = "an address like [::1]:50051, or unix:/PATH";
 
@@ -136,16 +138,16 @@ impl Listener {
         })
     }
 
-    /// The next connection.
-    pub(crate) async fn accept(&self) -> io::Result<Stream> {
+    /// The next connection, and whose it is.
+    pub(crate) async fn accept(&self) -> io::Result<(Stream, Client)> {
         Ok(match &self.0 {
             Socket::Tcp(listener) => {
-                let (stream, _) = listener.accept().await?;
+                let (stream, address) = listener.accept().await?;
                 // Small messages must not wait for others. If this fails, the first read fails too.
                 let _ = stream.set_nodelay(true);
-                Either::Left(stream)
+                (Either::Left(stream), Client::at(address.ip()))
             }
-            Socket::Unix(listener, _) => Either::Right(listener.accept().await?.0),
+            Socket::Unix(listener, _) => (Either::Right(listener.accept().await?.0), Client::Local),
         })
     }
 }

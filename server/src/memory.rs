@@ -32,7 +32,7 @@ fn configured_bytes(config: &Config) -> u64 {
     let bounds = [
         config.store.bytes,
         uploads,
-        config.streams.upload_bytes.get(),
+        config.streams.upload_bytes.get() / 3 * 4,
         loaded,
         config.maximum_unread_bytes.get(),
     ];

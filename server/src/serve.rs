@@ -33,6 +33,7 @@ use crate::{
     connect::{Connect, Transcoding},
     error::Limit,
     executor::SearchExecutor,
+    faults::FaultPoint,
     limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
     listen::Listener,
     middleware::Around,
@@ -45,7 +46,7 @@ use crate::{
     },
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
-    services::{BYTES_PER_PERMIT, Handler, Shared, load_saved_rigs},
+    services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
     track::OpenTracks,
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
@@ -116,6 +117,8 @@ pub enum ServeError {
 #[derive(Debug)]
 pub struct Server {
     handler: Handler,
+    /// `None` if nothing is saved.
+    files: Option<Arc<SavedFiles>>,
     builds: Places,
 }
 
@@ -191,6 +194,7 @@ impl Server {
             unstopped(|stop| object.derived_until(stop)?.prepare(&config.default_rig, stop));
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
+        let faults = executor.faults.clone();
         let atlas_files = match config.kept_atlases() {
             Some(path) => {
                 let opened = AtlasFiles::open(path.clone());
@@ -199,7 +203,7 @@ impl Server {
             None => None,
         };
         let models = config.maximum_object_bytes.get();
-        let rig_records = files.map(|files| saved_rigs(files, models));
+        let rig_records = files.clone().map(|files| saved_rigs(files, models));
         let builds = Places::new(Limit::Uploads, config.maximum_uploads.get(), RETRY_UPLOAD_AFTER);
         let shared = Shared {
             atlases: Atlases::start(
@@ -212,7 +216,7 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), rig_records)),
-            resizer: Resizer(Arc::clone(&builds.free)),
+            resizer: Resizer(Arc::new(Semaphore::new(config.derivations()))),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
@@ -222,9 +226,9 @@ impl Server {
             deriving: Arc::new(Semaphore::new(config.derivations())),
             ahead: Semaphore::new(1),
             created: AtomicU64::new(0),
-            upload_bytes: Arc::new(Semaphore::new(
-                config.streams.upload_bytes.get().div_ceil(BYTES_PER_PERMIT),
-            )),
+            faults,
+            upload_bytes: upload_places(config.streams.upload_bytes.get()),
+            watchers: watcher_places(config.streams.watchers.get()),
             tracks: Arc::new(OpenTracks::new(config.streams.tracks.get())),
             calls: watch::Sender::new(()),
             unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
@@ -233,6 +237,7 @@ impl Server {
         };
         Ok(Self {
             handler: Handler(Arc::new(shared)),
+            files,
             builds,
         })
     }
@@ -245,6 +250,9 @@ impl Server {
             config,
             ..
         } = &*self.handler;
+        if let Some(files) = &self.files {
+            files.own().await?;
+        }
         let objects = objects.read_saved().await?;
         let rigs = load_saved_rigs(rigs, config.mesh_limits(config.maximum_object_bytes)).await?;
         let (store, milliseconds) = (&config.place, start.elapsed().as_millis());
@@ -254,6 +262,12 @@ impl Server {
             tracing::info!(%store, objects, rigs, milliseconds, "created objects and rigs are saved");
         }
         Ok(())
+    }
+
+    /// Calls a closure at the points where tests inject faults.
+    #[doc(hidden)]
+    pub fn inject_faults(&self, hook: impl Fn(FaultPoint) + Send + Sync + 'static) {
+        self.handler.faults.set(Box::new(hook));
     }
 
     /// The server's activity.
@@ -293,8 +307,17 @@ impl Server {
         listeners: Vec<Listener>,
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
-        self.read_saved().await?;
-        let Self { handler, builds } = self;
+        if let Err(error) = self.read_saved().await {
+            if let Some(files) = &self.files {
+                files.give_back().await;
+            }
+            return Err(error.into());
+        }
+        let Self {
+            handler,
+            files,
+            builds,
+        } = self;
         let config = &handler.config;
         let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
         let grasps = GraspServiceServer::new(handler.clone())
@@ -350,6 +373,7 @@ impl Server {
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
             .layer(Around(Calls {
                 in_flight: handler.calls.clone(),
+                faults: handler.faults.clone(),
                 uploads: builds,
                 upload_grace: 2 * config.streams.upload_idle,
                 packers: Arc::clone(&packers),
@@ -389,10 +413,20 @@ impl Server {
             close.cancel();
             std::future::pending::<()>().await;
         };
+        let lost = async {
+            match &files {
+                Some(files) => files.lost().await,
+                None => std::future::pending().await,
+            }
+        };
         tokio::select! {
             served = serving => served?,
             () = handler.unread.close_stalled() => {}
+            lost = lost => return Err(lost.into()),
             () = shutting_down => {}
+        }
+        if let Some(files) = &files {
+            files.give_back().await;
         }
         tracing::info!("stopped");
         Ok(())

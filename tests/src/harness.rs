@@ -7,7 +7,7 @@ use grasp_proto::v1::{
     self, grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
     object_service_client::ObjectServiceClient,
 };
-use grasp_server::{Config, Gauges, ServeError, Server, config::StorePlace};
+use grasp_server::{Config, FaultPoint, Gauges, ServeError, Server, config::StorePlace};
 use grasp_synthesis::base::pose::Pose;
 use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
@@ -33,6 +33,14 @@ impl TestServer {
 
     /// Starts a server whose configuration `adapt` changes.
     pub async fn start_with(adapt: impl FnOnce(&mut Config)) -> Self {
+        Self::start_faulty(adapt, |_| {}).await
+    }
+
+    /// The same with a hook that injects faults.
+    pub async fn start_faulty(
+        adapt: impl FnOnce(&mut Config),
+        hook: impl Fn(FaultPoint) + Send + Sync + 'static,
+    ) -> Self {
         let mut config = Config {
             workers: WORKERS.try_into().expect("there are workers"),
             builder_threads: 0,
@@ -45,6 +53,7 @@ impl TestServer {
             .expect("a free port of the loopback interface");
         let address = listener.local_addr().expect("a bound socket has an address");
         let server = Server::new(config).expect("the server starts");
+        server.inject_faults(hook);
         let gauges = server.gauges();
         let stop = CancellationToken::new();
         let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));

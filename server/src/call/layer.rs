@@ -14,11 +14,14 @@ use tower::Service;
 use super::{
     CallContext, OpenCall,
     packing::{accepts_gzip, packing},
+    panics::contained,
     upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
 use crate::{
     budget::{DeadlineReserve, parse_grpc_timeout},
+    client::Client,
     error::{ServiceError, blame_client},
+    faults::Faults,
     limits::{MAX_FIND_REQUEST, Places},
     middleware::{Answer, Middleware},
     net::{Reader, arriving},
@@ -56,6 +59,7 @@ pub(crate) fn is_upload(path: &str) -> bool {
 pub(crate) struct Calls {
     /// Has a receiver per call in flight.
     pub in_flight: watch::Sender<()>,
+    pub faults: Faults,
     /// One place per concurrent upload.
     pub uploads: Places,
     /// Longest pause in an upload.
@@ -95,16 +99,19 @@ impl Middleware<Body> for Calls {
             .get("grpc-timeout")
             .and_then(|header| header.to_str().ok())
             .and_then(parse_grpc_timeout);
-        let context = CallContext::arriving(timeout);
+        let reader = request.extensions().get::<Arc<Reader>>().cloned();
+        let client = reader
+            .as_ref()
+            .map_or(Client::Local, |reader| reader.client.clone());
+        let context = CallContext::arriving(timeout, client);
         let path = request.uri().path();
         let mut call = OpenCall::new(path, context.clone(), &self.in_flight, &self.reserve);
-        let reader = request.extensions().get::<Arc<Reader>>().cloned();
-        let place = match reader.as_ref().map(|reader| reader.calls.take()).transpose() {
+        let place = match reader.as_ref().map(|reader| reader.begin_call()).transpose() {
             Ok(place) => place,
             Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
         };
         let end = self.end(path, &context);
-        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads));
+        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads, context.client.clone()));
         // Beyond these bytes, an upload has a place and needs no other bound.
         let (largest, most_counted) = match upload {
             Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),
@@ -118,7 +125,7 @@ impl Middleware<Body> for Calls {
             let grace = self.upload_grace;
             request = request.map(|body| bounded_upload(body, permit, grace));
         }
-        let answer = next(request);
+        let answer = contained(next(request), self.faults.clone());
         let packers = Arc::clone(&self.packers);
         let answer = async move {
             let answer = answer.await?;

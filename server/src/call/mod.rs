@@ -5,6 +5,7 @@
 
 mod layer;
 mod packing;
+mod panics;
 mod upload;
 
 use std::{
@@ -24,6 +25,7 @@ pub(crate) use self::{
 };
 use crate::{
     budget::DeadlineReserve,
+    client::Client,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
@@ -36,6 +38,7 @@ pub(crate) struct CallContext {
     pub arrived: Instant,
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
+    pub client: Client,
     record: Arc<CallRecord>,
 }
 
@@ -72,16 +75,18 @@ impl CallContext {
         Self {
             arrived,
             deadline: self.deadline,
+            client: self.client.clone(),
             record: Arc::default(),
         }
     }
 
-    fn arriving(timeout: Option<Duration>) -> Self {
+    fn arriving(timeout: Option<Duration>, client: Client) -> Self {
         let arrived = Instant::now();
         Self {
             arrived,
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
+            client,
             record: Arc::default(),
         }
     }

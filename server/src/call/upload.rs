@@ -11,12 +11,13 @@ use std::{
 };
 
 use bytes::Bytes;
-use tokio::{sync::OwnedSemaphorePermit, time::Sleep};
+use tokio::time::Sleep;
 use tonic::body::Body;
 
 use crate::{
+    client::Client,
     error::ServiceError,
-    limits::{Places, locked},
+    limits::{Place, Places, locked},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
@@ -30,15 +31,17 @@ const MIN_RATE: usize = 16 << 10;
 #[derive(Clone, Debug)]
 pub(crate) struct UploadPermit {
     places: Places,
-    taken: Arc<Mutex<Option<OwnedSemaphorePermit>>>,
+    client: Client,
+    taken: Arc<Mutex<Option<Place>>>,
     /// Why the request cannot be received to its end.
     failure: Arc<OnceLock<ServiceError>>,
 }
 
 impl UploadPermit {
-    pub(super) fn new(places: &Places) -> Self {
+    pub(super) fn new(places: &Places, client: Client) -> Self {
         Self {
             places: places.clone(),
+            client,
             taken: Arc::default(),
             failure: Arc::default(),
         }
@@ -54,7 +57,7 @@ impl UploadPermit {
     pub(crate) fn take_place(&self) -> Result<(), ServiceError> {
         let mut taken = locked(&self.taken);
         if taken.is_none() {
-            *taken = Some(self.places.take()?);
+            *taken = Some(self.places.take(&self.client)?);
         }
         Ok(())
     }
@@ -138,7 +141,7 @@ mod tests {
         let places = Places::new(Limit::Uploads, 1, Duration::ZERO);
         let [(quickly, mut quick, _), (dripping, mut slow, permit)] = [(); 2].map(|()| {
             let (sender, receiver) = mpsc::channel(1000);
-            let permit = UploadPermit::new(&places);
+            let permit = UploadPermit::new(&places, Client::Local);
             let inner = Body::new(StreamBody::new(ReceiverStream::new(receiver)));
             let body = bounded_upload(inner, permit.clone(), Duration::from_millis(100));
             (sender, body, permit)

@@ -177,7 +177,7 @@ mod tests {
     use http_body_util::{BodyExt as _, Full};
 
     use super::*;
-    use crate::net::unread::UnreadAnswers;
+    use crate::{client::Client, net::unread::UnreadAnswers};
 
     #[tokio::test]
     async fn chunks_count_until_they_are_dropped() {
@@ -185,7 +185,7 @@ mod tests {
         let content: Vec<u8> = (0..3 * CHUNK + 5).map(|byte| byte as u8).collect();
         let counting = AnswerCount {
             rest: None,
-            reader: all.connect(),
+            reader: all.connect(Client::Local),
             _open: None,
         };
         let mut body = filtered(Body::new(Full::new(content.clone().into())), counting);
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn nothing_counts_of_a_body_that_is_read_while_its_request_ends() {
         let all = UnreadAnswers::new(usize::MAX);
-        let reader = all.connect();
+        let reader = all.connect(Client::Local);
         for _ in 0..2_000 {
             let arriving = Arc::new(ArrivingBytes {
                 reader: Arc::clone(&reader),

@@ -24,7 +24,10 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::transport::server::Connected;
 
-use crate::listen::{Listener, Stream};
+use crate::{
+    client::Client,
+    listen::{Listener, Stream},
+};
 pub(crate) use answers::{UnreadCount, arriving};
 pub(crate) use unread::{Reader, UnreadAnswers};
 
@@ -62,9 +65,9 @@ pub(crate) fn accept(
         // The semaphore is never closed.
         while let Ok(place) = Arc::clone(&places).acquire_owned().await {
             match accept_any(&mut listeners).await {
-                Ok(stream) => {
+                Ok((stream, client)) => {
                     pause = FIRST_PAUSE;
-                    let connection = Connection::new(stream, place, unread.connect(), close.clone());
+                    let connection = Connection::new(stream, place, unread.connect(client), close.clone());
                     if sender.send(Ok(connection)).await.is_err() {
                         return;
                     }
@@ -85,7 +88,7 @@ pub(crate) fn accept(
 }
 
 /// The next connection of any listener. The one that had it comes last the next time.
-async fn accept_any(listeners: &mut [Listener]) -> io::Result<Stream> {
+async fn accept_any(listeners: &mut [Listener]) -> io::Result<(Stream, Client)> {
     let accepting = listeners.iter().map(|listener| Box::pin(listener.accept()));
     let (stream, index, others) = select_all(accepting).await;
     drop(others);
@@ -275,11 +278,11 @@ mod tests {
 
     #[tokio::test]
     async fn headers_of_http_1_are_bounded_and_bodies_are_not() {
-        let reader = UnreadAnswers::new(usize::MAX).connect();
+        let reader = UnreadAnswers::new(usize::MAX).connect(Client::Local);
         let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap()).await.unwrap();
         let address = listener.address().unwrap().to_string();
         let mut client = TcpStream::connect(address).await.unwrap();
-        let stream = listener.accept().await.unwrap();
+        let (stream, _) = listener.accept().await.unwrap();
         let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
         let mut connection = Connection::new(stream, place, Arc::clone(&reader), CancellationToken::new());
         let sending = tokio::spawn(async move {

@@ -14,11 +14,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::CancellationToken;
 
 use crate::{
+    client::Client,
     error::{Limit, ServiceError},
-    limits::{MAX_RESPONSE, Places, locked},
+    limits::{MAX_RESPONSE, locked},
 };
 
 /// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size.
@@ -60,8 +62,10 @@ pub(crate) struct Reader {
     /// Number of requests whose headers have been read.
     pub(super) requests: AtomicU64,
     answering: Arc<()>,
-    /// Places for calls.
-    pub(crate) calls: Places,
+    /// A permit per call that may be running.
+    calls: Arc<Semaphore>,
+    /// Whose connection it is.
+    pub(crate) client: Client,
     /// Cancelled to close the connection at once.
     pub(super) cut_off: CancellationToken,
 }
@@ -106,7 +110,7 @@ impl UnreadAnswers {
         self.total.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn connect(self: &Arc<Self>) -> Arc<Reader> {
+    pub(crate) fn connect(self: &Arc<Self>, client: Client) -> Arc<Reader> {
         let reader = Arc::new(Reader {
             all: Arc::clone(self),
             waiting: Mutex::default(),
@@ -114,7 +118,8 @@ impl UnreadAnswers {
             progress: AtomicU64::new(0),
             requests: AtomicU64::new(0),
             answering: Arc::default(),
-            calls: Places::new(Limit::Calls, MAX_CALLS, RETRY_WHEN_ANSWERED),
+            calls: Arc::new(Semaphore::new(MAX_CALLS)),
+            client,
             cut_off: CancellationToken::new(),
         });
         let mut readers = locked(&self.readers);
@@ -185,6 +190,16 @@ impl UnreadAnswers {
 }
 
 impl Reader {
+    /// Counts a call as running until the permit is dropped.
+    pub(crate) fn begin_call(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
+        let permit = Arc::clone(&self.calls).try_acquire_owned();
+        permit.map_err(|_| ServiceError::Overloaded {
+            limit: Limit::Calls,
+            maximum: MAX_CALLS,
+            retry_after: RETRY_WHEN_ANSWERED,
+        })
+    }
+
     /// Checks that the connection may get another answer.
     pub(crate) fn admit(&self) -> Result<(), ServiceError> {
         if self.unread() < MAX_PER_CONNECTION {
@@ -269,7 +284,7 @@ mod tests {
     #[test]
     fn rejects_calls_of_a_connection_on_which_too_much_waits() {
         let all = UnreadAnswers::new(usize::MAX);
-        let (one, other) = (all.connect(), all.connect());
+        let (one, other) = (all.connect(Client::Local), all.connect(Client::Local));
         let since = one.add(MAX_PER_CONNECTION);
         assert!(one.admit().is_err() && other.admit().is_ok());
         one.remove(1, since);
@@ -280,7 +295,7 @@ mod tests {
     #[test]
     fn closes_the_connection_with_the_most_beyond_the_bound() {
         let all = UnreadAnswers::new(100);
-        let readers: Vec<_> = (0..3).map(|_| all.connect()).collect();
+        let readers: Vec<_> = (0..3).map(|_| all.connect(Client::Local)).collect();
         let pairs = readers.iter().zip([30, 50, 20]);
         let since: Vec<u64> = pairs.map(|(reader, bytes)| reader.add(bytes)).collect();
         assert!(readers.iter().all(|reader| !is_closed(reader)));
@@ -298,12 +313,12 @@ mod tests {
     #[test]
     fn closes_connections_that_wait_for_long_and_not_one_with_a_large_new_answer() {
         let all = UnreadAnswers::new(100);
-        let slow: Vec<_> = (0..10).map(|_| all.connect()).collect();
+        let slow: Vec<_> = (0..10).map(|_| all.connect(Client::Local)).collect();
         for reader in &slow {
             reader.add(6);
         }
         std::thread::sleep(Duration::from_millis(20));
-        let large = all.connect();
+        let large = all.connect(Client::Local);
         large.add(60);
         assert!(!is_closed(&large));
         // Of the others, only as many as necessary.
@@ -313,7 +328,11 @@ mod tests {
     #[test]
     fn closes_only_connections_that_take_nothing() {
         let all = UnreadAnswers::new(usize::MAX);
-        let (stalled, slow, idle) = (all.connect(), all.connect(), all.connect());
+        let (stalled, slow, idle) = (
+            all.connect(Client::Local),
+            all.connect(Client::Local),
+            all.connect(Client::Local),
+        );
         stalled.add(10);
         let since = slow.add(10);
         std::thread::sleep(Duration::from_millis(60));

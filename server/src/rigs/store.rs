@@ -18,7 +18,10 @@ use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
-    saved::{FieldMove, RIGS, Records, SavedFiles, Unreadable, field, message, move_fields, seal, wait_for},
+    saved::{
+        FieldMove, RIGS, Records, SavedFiles, Unreadable, are_few, field, message, move_fields, seal,
+        wait_for,
+    },
 };
 
 /// All rigs.
@@ -247,6 +250,10 @@ struct SavedRig {
     request: Option<v1::CreateRigRequest>,
 }
 
+/// The request in a record, and its lists: hands with joints, the map of joints, and limits.
+const NOW: usize = 10;
+const LISTS: [&[usize]; 4] = [&[3], &[3, 2], &[4], &[5]];
+
 /// The places of a version 0.1 record's fields in a request.
 const REQUEST: &[FieldMove] = &[
     field(1, &[1]),
@@ -270,10 +277,14 @@ const LIMITS: &[FieldMove] = &[
 ];
 
 fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
+    if !are_few(record, &[NOW], &LISTS) {
+        return None;
+    }
     if let Some(request) = SavedRig::decode(record).ok()?.request {
         return Some(request);
     }
-    let mut request = v1::CreateRigRequest::decode(&*move_fields(record, REQUEST)?).ok()?;
+    let request = move_fields(record, REQUEST).filter(|request| are_few(request, &[], &LISTS))?;
+    let mut request = v1::CreateRigRequest::decode(&*request).ok()?;
     for (place, limits) in (1..).zip(&mut request.limits) {
         if limits.digit == 0 {
             limits.digit = place;

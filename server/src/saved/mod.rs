@@ -1,6 +1,11 @@
 //! The folder or bucket of created objects and rigs: files that are written as a whole and checked when they are read. An object or
 //! rig whose file is damaged or missing stays known by its name, and is back when its file is.
 
+#[cfg_attr(
+    not(feature = "s3"),
+    allow(dead_code, reason = "only buckets have leases; their tests need none")
+)]
+mod lease;
 mod records;
 
 #[cfg(unix)]
@@ -22,8 +27,9 @@ use object_store::{
     Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, local::LocalFileSystem, path::Path as ObjectPath,
 };
 
+use self::lease::Lease;
 pub(crate) use self::records::{
-    FieldMove, NotCreated, Records, Unreadable, field, message, move_fields, seal,
+    FieldMove, NotCreated, Records, Unreadable, are_few, field, message, move_fields, seal,
 };
 use crate::error::ServiceError;
 
@@ -43,6 +49,8 @@ const NEEDED: &str = "it must be a folder that only this server writes to, or me
 pub(crate) struct SavedFiles {
     files: Arc<dyn ObjectStore>,
     folder: Option<OwnedFolder>,
+    /// That of a bucket.
+    lease: Option<Arc<Lease>>,
     /// As in the configuration, for messages.
     place: String,
 }
@@ -64,13 +72,13 @@ impl SavedFiles {
             place: place.to_string(),
             reason: reason.to_string(),
         };
-        let (files, folder): (Arc<dyn ObjectStore>, _) = match place {
+        let (files, folder, lease): (Arc<dyn ObjectStore>, _, _) = match place {
             StorePlace::Memory => return Ok(None),
             StorePlace::Folder(path) => {
                 let folder = OwnedFolder::open(path, &[OBJECTS, MESHES, RIGS]);
                 let folder = folder.map_err(|source| error(&format!("{NEEDED}: {source}")))?;
                 let files = LocalFileSystem::new_with_prefix(path).map_err(|source| error(&source))?;
-                (Arc::new(files.with_fsync(true)), Some(folder))
+                (Arc::new(files.with_fsync(true)), Some(folder), None)
             }
             #[cfg(feature = "s3")]
             StorePlace::S3 { bucket, prefix } => {
@@ -78,13 +86,15 @@ impl SavedFiles {
                     .with_bucket_name(bucket)
                     .build()
                     .map_err(|source| error(&source))?;
-                let files = object_store::prefix::PrefixStore::new(files, prefix.as_str());
-                (Arc::new(files), None)
+                let files = Arc::new(object_store::prefix::PrefixStore::new(files, prefix.as_str()));
+                let lease = Lease::new(Arc::clone(&files) as Arc<_>, lease::Times::USUAL);
+                (files, None, Some(lease))
             }
         };
         Ok(Some(Self {
             files,
             folder,
+            lease,
             place: place.to_string(),
         }))
     }
@@ -93,6 +103,38 @@ impl SavedFiles {
         StoreError {
             place: self.place.clone(),
             reason: reason.to_string(),
+        }
+    }
+
+    /// Makes this server the only one that uses the bucket; a folder it owns since it was opened.
+    pub(crate) async fn own(&self) -> Result<(), StoreError> {
+        match &self.lease {
+            Some(lease) => lease.take(|reason| self.error(reason)).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Lets another server use the bucket.
+    pub(crate) async fn give_back(&self) {
+        if let Some(lease) = &self.lease {
+            lease.give_back().await;
+        }
+    }
+
+    /// Waits until another server has taken the bucket over, which takes a pause of this one; gives the error.
+    pub(crate) async fn lost(&self) -> StoreError {
+        match &self.lease {
+            Some(lease) => lease.lost().await,
+            None => std::future::pending().await,
+        }
+        self.error(&"another server took it over, because this one could not reach it for too long")
+    }
+
+    /// Changes something, as long as no other server may.
+    async fn change<T>(&self, change: impl Future<Output = Result<T, Error>>) -> Result<T, Error> {
+        match &self.lease {
+            Some(lease) => lease.within(change).await,
+            None => change.await,
         }
     }
 
@@ -129,7 +171,7 @@ impl SavedFiles {
 
     /// Writes a file as a whole: a failure leaves it as it was.
     pub(crate) async fn write(&self, path: &ObjectPath, bytes: Bytes) -> Result<(), Error> {
-        self.files.put(path, bytes.into()).await?;
+        self.change(self.files.put(path, bytes.into())).await?;
         if let Some(folder) = &self.folder {
             make_private(&folder.path.join(path.as_ref()));
         }
@@ -138,7 +180,7 @@ impl SavedFiles {
 
     /// Deletes a file for good; one that is missing counts as deleted.
     pub(crate) async fn delete(&self, path: &ObjectPath) -> Result<(), Error> {
-        match self.files.delete(path).await {
+        match self.change(self.files.delete(path)).await {
             Err(Error::NotFound { .. }) => {}
             result => result?,
         }

@@ -1,6 +1,10 @@
 //! Records: files with the SHA-256 of a message before it, so that any changed or missing byte shows.
 
-use std::{collections::BTreeSet, fmt, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt, iter,
+    sync::Arc,
+};
 
 use bytes::Bytes;
 use object_store::{Error, path::Path};
@@ -70,18 +74,15 @@ struct Names {
 /// The names of a message. `None` if it is not one, or has too many or too long ones: read one by one, a forged message takes no more
 /// memory than a right one.
 fn names_of(mut message: &[u8]) -> Option<BTreeSet<String>> {
-    const KEY: usize = 1 << 3 | 2;
     let mut names = BTreeSet::new();
     while !message.is_empty() {
-        let key = decode_length_delimiter(&mut message).ok()?;
-        let length = decode_length_delimiter(&mut message).ok()?;
-        let (name, rest) = message.split_at_checked(length)?;
-        let is_name = key == KEY && (1..=MAX_NAME).contains(&length);
+        let field = take_field(&mut message)?;
+        let is_name =
+            (field.number, field.wire_type) == (1, 2) && (1..=MAX_NAME).contains(&field.content.len());
         if !is_name || names.len() == MAX_NAMES {
             return None;
         }
-        names.insert(str::from_utf8(name).ok()?.to_owned());
-        message = rest;
+        names.insert(str::from_utf8(field.content).ok()?.to_owned());
     }
     Some(names)
 }
@@ -232,30 +233,78 @@ pub(crate) const fn message(old: usize, now: &'static [usize], fields: &'static 
     FieldMove { old, now, fields }
 }
 
+/// A field of a message as it was written.
+struct WrittenField<'m> {
+    number: usize,
+    wire_type: usize,
+    /// The content of a message, text or bytes; of a number, nothing or its bytes.
+    content: &'m [u8],
+    /// All but the number and the type.
+    value: &'m [u8],
+}
+
+/// Takes the first field off a message. `None` if it is not a message.
+fn take_field<'m>(message: &mut &'m [u8]) -> Option<WrittenField<'m>> {
+    let key = decode_length_delimiter(&mut *message).ok()?;
+    let mut rest = *message;
+    let length = match key & 7 {
+        0 => decode_length_delimiter(&mut rest).map(|_| 0).ok()?,
+        1 => 8,
+        5 => 4,
+        _ => decode_length_delimiter(&mut rest).ok()?,
+    };
+    let (content, rest) = rest.split_at_checked(length)?;
+    let value = &message[..message.len() - rest.len()];
+    *message = rest;
+    Some(WrittenField {
+        number: key >> 3,
+        wire_type: key & 7,
+        content,
+        value,
+    })
+}
+
+/// Most messages of a list in a record, more than any request has.
+const MAX_LISTED: usize = 32_768;
+
+/// True if the messages in these lists, paths of field numbers below `of`, are few enough to be decoded: empty ones take a hundred times
+/// their bytes.
+pub(crate) fn are_few(message: &[u8], of: &[usize], lists: &[&[usize]]) -> bool {
+    let mut paths = lists.iter().map(|list| [of, list].concat());
+    paths.all(|path| count(message, &path) <= MAX_LISTED)
+}
+
+fn count(message: &[u8], path: &[usize]) -> usize {
+    match path {
+        [] => 1,
+        [number, rest @ ..] => contents(message, *number)
+            .map(|content| count(content, rest))
+            .sum(),
+    }
+}
+
+/// The contents of a message's fields of this number, up to the first that is not one.
+fn contents(mut message: &[u8], number: usize) -> impl Iterator<Item = &[u8]> {
+    let fields = iter::from_fn(move || take_field(&mut message));
+    fields
+        .filter(move |field| field.number == number)
+        .map(|field| field.content)
+}
+
 /// A message with its fields in their new places. `None` if it is not a message.
 pub(crate) fn move_fields(mut old: &[u8], moves: &[FieldMove]) -> Option<Vec<u8>> {
-    let (mut now, mut numbers) = (Vec::new(), Vec::new());
+    let (mut now, mut counts) = (Vec::new(), BTreeMap::<usize, usize>::new());
     while !old.is_empty() {
-        let key = decode_length_delimiter(&mut old).ok()?;
-        let (number, wire_type) = (key >> 3, key & 7);
-        let mut rest = old;
-        let length = match wire_type {
-            0 => decode_length_delimiter(&mut rest).map(|_| 0).ok()?,
-            1 => 8,
-            5 => 4,
-            _ => decode_length_delimiter(&mut rest).ok()?,
-        };
-        let (mut content, rest) = rest.split_at_checked(length)?;
-        let value = &old[..old.len() - rest.len()];
-        old = rest;
-        let earlier = numbers.iter().filter(|earlier| **earlier == number).count();
-        numbers.push(number);
-        let places = moves.iter().filter(|to| to.old == number);
-        let Some(place) = places.take(earlier + 1).last() else {
+        let field = take_field(&mut old)?;
+        let count = counts.entry(field.number).or_default();
+        *count += 1;
+        let places = moves.iter().filter(|to| to.old == field.number);
+        let Some(place) = places.take(*count).last() else {
             continue;
         };
         let inner;
-        let mut value = value.to_vec();
+        let mut content = field.content;
+        let mut value = field.value.to_vec();
         if !place.fields.is_empty() {
             inner = move_fields(content, place.fields)?;
             content = &inner;
@@ -265,7 +314,7 @@ pub(crate) fn move_fields(mut old: &[u8], moves: &[FieldMove]) -> Option<Vec<u8>
             now.extend(content);
             continue;
         };
-        value.splice(0..0, varint((own << 3) | wire_type));
+        value.splice(0..0, varint((own << 3) | field.wire_type));
         for number in outer.iter().rev() {
             value = [varint((number << 3) | 2), varint(value.len()), value].concat();
         }

@@ -294,7 +294,8 @@ mod tests {
 
     use super::*;
     use crate::{
-        objects::tests::tetrahedron, rigs::store::RigStore, search::tests::job, validate::find_query,
+        client::Client, objects::tests::tetrahedron, rigs::store::RigStore, search::tests::job,
+        validate::find_query,
     };
 
     /// A search whose time has passed.
@@ -313,12 +314,12 @@ mod tests {
 
     #[tokio::test]
     async fn only_a_call_with_a_deadline_is_answered_before_its_search_has_ended() {
-        let executor = SearchExecutor::new(1, 3).expect("threads start");
+        let executor = SearchExecutor::new(1, 8).expect("threads start");
         // Occupies the only worker, as if it waited for a core.
         let (release, released) = mpsc::channel::<()>();
         let (started, has_started) = tokio::sync::oneshot::channel();
         let occupied = {
-            let (executor, admission) = (executor.clone(), executor.places.take().unwrap());
+            let (executor, admission) = (executor.clone(), executor.places.take(&Client::Local).unwrap());
             tokio::spawn(async move {
                 let occupy = move || {
                     started.send(()).unwrap();
@@ -329,10 +330,15 @@ mod tests {
         };
         has_started.await.unwrap();
         let patient = {
-            let (executor, admission) = (executor.clone(), executor.places.take().unwrap());
+            let (executor, admission) = (executor.clone(), executor.places.take(&Client::Local).unwrap());
             tokio::spawn(async move { find(late_job(false), &executor, admission).await })
         };
-        let urgent = find(late_job(true), &executor, executor.places.take().unwrap()).await;
+        let urgent = find(
+            late_job(true),
+            &executor,
+            executor.places.take(&Client::Local).unwrap(),
+        )
+        .await;
         let answer = urgent.unwrap().response;
         assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
         assert_eq!(answer.attempts(), 0);

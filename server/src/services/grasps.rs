@@ -70,7 +70,7 @@ impl Handler {
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;
         let held = stored.hold();
-        let admission = self.executor.places.take()?;
+        let admission = self.executor.places.take(&call.client)?;
         // The budget starts after the object's preparation.
         let (mut derived, mut since) = match self.objects.kept(&stored, Need::Call) {
             Some(kept) => (kept, call.arrived),
@@ -200,7 +200,7 @@ impl GraspService for Handler {
         let StreamQuery { find, sent } = stream_query(request, self.known_rigs(), self.exists())?;
         let ready = self.ready(find, &call).await?;
         let handler = self.clone();
-        let messages = messages(self.shutdown.clone(), |sender| async move {
+        let messages = messages(self, |sender| async move {
             handler.send_found(sent, ready, &call, sender).await
         });
         Ok(Response::new(messages))

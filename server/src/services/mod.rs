@@ -18,7 +18,10 @@ use std::{
 use tokio::sync::{Semaphore, watch};
 use tokio_util::sync::CancellationToken;
 
-pub(crate) use rigs::load_saved_rigs;
+pub(crate) use self::{
+    object_streams::{upload_places, watcher_places},
+    rigs::load_saved_rigs,
+};
 
 use crate::{
     atlases::Atlases,
@@ -27,6 +30,8 @@ use crate::{
     config::Config,
     error::ServiceError,
     executor::{SearchExecutor, before, run_blocking, run_stoppable},
+    faults::Faults,
+    limits::Places,
     net::UnreadAnswers,
     objects::{
         Derived, Revision, StoredObject,
@@ -41,9 +46,6 @@ use crate::{
 /// Number of newest objects that are prepared for their first calls.
 const MAX_PREPARED_AHEAD: u64 = 16;
 
-/// Bytes per permit of the pool that uploads in pieces share.
-pub(crate) const BYTES_PER_PERMIT: usize = 1 << 10;
-
 /// State shared by the handlers.
 #[derive(Debug)]
 pub(crate) struct Shared {
@@ -57,8 +59,9 @@ pub(crate) struct Shared {
     pub reserve: Arc<DeadlineReserve>,
     /// One permit: deletions queue here without holding a thread, or they could take all threads that wait for the disk.
     pub deletions: Arc<Semaphore>,
-    /// A permit per [`BYTES_PER_PERMIT`] bytes of all uploads in pieces together.
-    pub upload_bytes: Arc<Semaphore>,
+    /// A place per byte of all uploads in pieces together.
+    pub upload_bytes: Places,
+    pub watchers: Places,
     pub tracks: Arc<OpenTracks>,
     /// Has a receiver per call in flight.
     pub calls: watch::Sender<()>,
@@ -71,6 +74,7 @@ pub(crate) struct Shared {
     /// One permit: new objects are prepared ahead of calls one at a time.
     pub ahead: Semaphore,
     pub created: AtomicU64,
+    pub faults: Faults,
 }
 
 /// Implements the services.

@@ -1,23 +1,22 @@
 //! The calls of `ObjectService` that stream: uploads, meshes and watches.
 
-use std::{collections::BTreeSet, pin::pin, sync::Arc, time::Duration};
+use std::{collections::BTreeSet, pin::pin, time::Duration};
 
 use grasp_proto::v1::{self, upload_object_request::Part};
 use grasp_synthesis::model::hand::Handedness;
 use sha2::{Digest as _, Sha256};
-use tokio::sync::OwnedSemaphorePermit;
 use tokio_stream::StreamExt as _;
 use tonic::Streaming;
 
 use super::{
-    BYTES_PER_PERMIT, Handler, checked_id,
+    Handler, checked_id,
     streaming::{Messages, lazy_messages, messages},
 };
 use crate::{
     call::{CallContext, UploadPermit},
     error::{Limit, ServiceError, Violation},
     executor::run_stoppable,
-    limits::MAX_PIECE,
+    limits::{MAX_PIECE, Place, Places},
     objects::{
         Listed,
         glb::glb_pieces,
@@ -32,7 +31,21 @@ use crate::{
 const MAX_UPLOAD_TIME: Duration = Duration::from_mins(10);
 
 /// When to retry if others upload as much as the server takes at a time.
-const RETRY_AFTER: Duration = Duration::from_secs(2);
+const RETRY_UPLOAD_AFTER: Duration = Duration::from_secs(2);
+
+/// When a client should try again if there are too many watchers.
+const RETRY_WATCH_AFTER: Duration = Duration::from_secs(5);
+
+/// A place per byte of uploads in pieces; the largest of them leaves a quarter to those of other clients.
+pub(crate) fn upload_places(largest: usize) -> Places {
+    let all = largest.saturating_add(largest / 3);
+    Places::new(Limit::UploadBytes, all, RETRY_UPLOAD_AFTER)
+}
+
+/// A place per watcher.
+pub(crate) fn watcher_places(maximum: usize) -> Places {
+    Places::new(Limit::Watchers, maximum, RETRY_WATCH_AFTER)
+}
 
 impl Handler {
     pub(super) async fn upload(
@@ -59,12 +72,12 @@ impl Handler {
         self.whole_message(&object).await
     }
 
-    /// Receives the parts of an upload: a request with its mesh, and the permit for its memory.
+    /// Receives the parts of an upload: a request with its mesh, and the room for its memory.
     async fn receive(
         &self,
         parts: Streaming<v1::UploadObjectRequest>,
         call: &CallContext,
-    ) -> Result<(v1::CreateObjectRequest, OwnedSemaphorePermit), ServiceError> {
+    ) -> Result<(v1::CreateObjectRequest, Place), ServiceError> {
         let mut parts = pin!(parts);
         let idle = self.config.streams.upload_idle;
         // The next part, with the total that it states; `None` at the end.
@@ -89,17 +102,15 @@ impl Handler {
         if request.request_id.is_empty() {
             self.objects.repeated(id, None)?;
         }
-        let permits = u32::try_from(bytes.div_ceil(BYTES_PER_PERMIT)).unwrap_or(u32::MAX);
-        let room = Arc::clone(&self.upload_bytes).try_acquire_many_owned(permits);
-        let overloaded = |maximum| ServiceError::Overloaded {
-            limit: Limit::UploadBytes,
-            maximum,
-            retry_after: RETRY_AFTER,
-        };
-        let room = room.map_err(|_| overloaded(most))?;
+        let room = self.upload_bytes.take_many(&call.client, bytes)?;
         let mut mesh: Vec<u8> = Vec::new();
         // Untouched memory costs nothing; growing in steps would copy, and take up to twice as much.
-        mesh.try_reserve_exact(bytes).map_err(|_| overloaded(bytes))?;
+        mesh.try_reserve_exact(bytes)
+            .map_err(|_| ServiceError::Overloaded {
+                limit: Limit::UploadBytes,
+                maximum: bytes,
+                retry_after: RETRY_UPLOAD_AFTER,
+            })?;
         let mut hash = Sha256::new();
         let expected = loop {
             let received = mesh.len();
@@ -160,12 +171,14 @@ impl Handler {
     pub(super) fn watch(
         &self,
         request: &v1::WatchObjectsRequest,
+        call: &CallContext,
     ) -> Result<Messages<v1::WatchObjectsResponse>, ServiceError> {
         let query = watch_query(request)?;
-        let most = self.config.streams.watchers.get();
-        let watcher = self.objects.watch(query, most)?;
+        let place = self.watchers.take(&call.client)?;
+        let watcher = self.objects.watch(query);
         let handler = self.clone();
-        Ok(messages(self.shutdown.clone(), |sender| async move {
+        Ok(messages(self, |sender| async move {
+            let _place = place;
             loop {
                 match handler.objects.next_report(&watcher)? {
                     Some(report) => sender.send(handler.report(report)).await?,

@@ -15,6 +15,7 @@ use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
+    faults::FaultPoint,
     limits::MAX_RESPONSE,
     objects::{
         Listed,
@@ -48,6 +49,7 @@ impl Handler {
         call: &CallContext,
         stop: Stop<'_>,
     ) -> Result<Listed, ServiceError> {
+        self.faults.at(FaultPoint::Build);
         let violations = Violations::default();
         let mut fields = object_fields(request, limits.bytes, &violations);
         let mut origin = Origin {
@@ -333,7 +335,8 @@ impl ObjectService for Handler {
         &self,
         request: Request<v1::WatchObjectsRequest>,
     ) -> Result<Response<Self::WatchObjectsStream>, Status> {
-        Ok(Response::new(self.watch(request.get_ref())?))
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.watch(request.get_ref(), &call)?))
     }
 }
 

@@ -9,10 +9,7 @@ use grasp_proto::{
     v1::{self, track_holdout_request::Message},
     wire_duration,
 };
-use tokio::{
-    sync::{OwnedSemaphorePermit, oneshot},
-    task::JoinSet,
-};
+use tokio::{sync::oneshot, task::JoinSet};
 use tonic::{Code, Status, Streaming};
 
 use super::{Handler, Shared, streaming::Messages};
@@ -20,7 +17,9 @@ use crate::{
     call::CallContext,
     convention::Convention,
     error::{Limit, ServiceError},
-    limits::MAX_FIND_REQUEST,
+    executor::contained,
+    faults::FaultPoint,
+    limits::{MAX_FIND_REQUEST, Place},
     track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, not_found},
     validate::{Frame, Latest, TrackPolicy, TrackQuery, sentences, track_query},
 };
@@ -43,7 +42,7 @@ struct Track {
     due: Option<Instant>,
     /// Keeps the object from being evicted between frames.
     held: Arc<()>,
-    _permit: OwnedSemaphorePermit,
+    _place: Place,
 }
 
 impl Handler {
@@ -67,8 +66,7 @@ impl Handler {
         let (inbox, call, handler) = (Arc::clone(&track.inbox), call.clone(), self.clone());
         let mut reader = JoinSet::new();
         reader.spawn(async move {
-            let end = read(frames, &inbox, &call, &handler).await;
-            inbox.end(end);
+            inbox.end(contained(read(frames, &inbox, &call, &handler)).await);
         });
         Ok(answers(track, reader))
     }
@@ -123,7 +121,7 @@ impl Handler {
             current,
         } = track_query(track, is_pushed, self.known_rigs(), self.exists())?;
         call.log_object(&object_id);
-        let permit = self.tracks.places.take()?;
+        let place = self.tracks.places.take(&call.client)?;
         let object = self.object(&object_id, call).await?.object;
         // Prepares the object for searches before the first frame.
         self.derived(&object, call).await?;
@@ -141,7 +139,7 @@ impl Handler {
             opened: Instant::now(),
             due: call.answer_due().filter(|_| !is_pushed),
             held: object.hold(),
-            _permit: permit,
+            _place: place,
         })
     }
 }
@@ -153,6 +151,7 @@ async fn read(
     call: &CallContext,
     shared: &Shared,
 ) -> Result<(), ServiceError> {
+    shared.faults.at(FaultPoint::Frames);
     while let Some(request) = frames.message().await.map_err(|status| broken(&status))? {
         match request.message {
             Some(Message::Frame(frame)) => put(inbox, frame, call.of_part(Instant::now()), None, shared)?,
@@ -220,13 +219,17 @@ impl Track {
         }
     }
 
-    /// Answers pushed frames, until none comes for too long or the server shuts down.
+    /// Answers pushed frames, until none comes for too long, an answer panics, or the server shuts down.
     async fn answer_pushed(mut self) {
         while let Ok(Some(PendingFrame { latest, call, reply })) = self.latest().await {
-            let answer = self.answer(latest, &call).await;
+            let answer = contained(self.answer(latest, &call)).await;
+            let is_broken = matches!(answer, Err(ServiceError::Panicked));
             if reply.is_some_and(|reply| reply.send(answer).is_err()) {
                 // Nobody received it.
                 self.holding.is_sent = false;
+            }
+            if is_broken {
+                return;
             }
         }
     }
@@ -327,6 +330,7 @@ impl Track {
         call: &CallContext,
     ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &*self.handler;
+        shared.faults.at(FaultPoint::Frame);
         self.holding.hold(&mut frame, at, &self.policy, &shared.rigs)?;
         let object = shared.object(&self.object_id, call).await?.object;
         self.held = object.hold();

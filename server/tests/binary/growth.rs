@@ -52,13 +52,13 @@ fn start(more: &[(&str, &str)]) -> Running {
     Running::start(&[&limits[..], more].concat())
 }
 
-async fn channel(address: &str) -> Channel {
+pub(crate) async fn channel(address: &str) -> Channel {
     let endpoint = Endpoint::from_shared(format!("http://{address}")).expect("it is an address");
     endpoint.connect().await.expect("it listens")
 }
 
 /// Resident memory of a server, or its peak, in bytes.
-fn memory(server: &Running, line: &str) -> usize {
+pub(crate) fn memory(server: &Running, line: &str) -> usize {
     let status = fs::read_to_string(format!("/proc/{}/status", server.child.id())).expect("it runs");
     let mut lines = status.lines();
     let kilobytes = lines.find_map(|text| text.strip_prefix(line)?.trim().strip_suffix(" kB"));
@@ -66,7 +66,7 @@ fn memory(server: &Running, line: &str) -> usize {
     kilobytes << 10
 }
 
-fn mib(bytes: usize) -> f64 {
+pub(crate) fn mib(bytes: usize) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 

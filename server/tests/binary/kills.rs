@@ -15,13 +15,11 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus as Random;
 use sha2::{Digest as _, Sha256};
 use tokio::task::JoinSet;
-use tonic::{
-    Code, Status,
-    transport::{Channel, Endpoint},
-};
+use tonic::{Code, Status, transport::Channel};
 
 use crate::{
     Folder, Running,
+    growth::channel,
     stress::{content, hills, mesh},
 };
 
@@ -241,11 +239,6 @@ fn start(folder: &Folder) -> Running {
     ])
 }
 
-async fn channel(server: &Running) -> Channel {
-    let endpoint = Endpoint::from_shared(format!("http://{}", server.address)).expect("it is an address");
-    endpoint.connect().await.expect("it listens")
-}
-
 /// Everything created that a server has, and the messages of objects whole.
 async fn everything(channel: &Channel) -> (BTreeMap<String, v1::GraspObject>, BTreeMap<String, v1::HandRig>) {
     let request = v1::ListObjectsRequest {
@@ -300,7 +293,7 @@ async fn kills_lose_nothing_acknowledged_and_leave_nothing_half_done() {
             tokio::time::sleep(Duration::from_millis(random.random_range(0..LONGEST_START_MS))).await;
             continue;
         }
-        let channel = channel(&server).await;
+        let channel = channel(&server.address).await;
         let (objects, rigs) = everything(&channel).await;
         slowest = slowest.max(begun.elapsed());
         in_flight += models.iter().filter(|model| model.in_flight.is_some()).count();
@@ -318,6 +311,9 @@ async fn kills_lose_nothing_acknowledged_and_leave_nothing_half_done() {
                 .entry(object.labels["mesh"].clone())
                 .or_insert_with(|| content(&glb).to_vec());
             assert!(content(&glb) == of, "{about}: {} has another mesh", object.name);
+        }
+        if kill % 100 == 99 {
+            println!("{kill} kills");
         }
         // Nothing else is in the folder.
         for (of, count) in [("objects", objects.len()), ("rigs", rigs.len())] {
@@ -363,7 +359,7 @@ async fn a_killed_server_with_ten_thousand_objects_is_ready_again_soon() {
     const COUNT: usize = 10_000;
     let folder = Folder::absent("kills-many");
     let server = start(&folder);
-    let mut client = ObjectServiceClient::new(channel(&server).await);
+    let mut client = ObjectServiceClient::new(channel(&server.address).await);
     client
         .create_object(hills("o00000", 2))
         .await
@@ -396,5 +392,5 @@ async fn a_killed_server_with_ten_thousand_objects_is_ready_again_soon() {
 
 /// Number of objects in the first page of a server that has begun to serve.
 async fn everything_of(server: &Running) -> usize {
-    everything(&channel(server).await).await.0.len()
+    everything(&channel(&server.address).await).await.0.len()
 }

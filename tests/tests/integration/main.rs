@@ -12,6 +12,7 @@ mod load;
 mod module_order;
 mod objects;
 mod own_hands;
+mod panics;
 mod real_input;
 mod reported;
 mod saved;

@@ -11,9 +11,9 @@ use std::{
 
 /// The server's top-level modules, as documented in its `lib.rs`.
 const SERVER: &[&[&str]] = &[
-    &["budget", "convention", "error", "listen", "middleware", "wire"],
-    &["health_check", "limits", "viewer"],
-    &["atlas_slots", "net", "saved", "web"],
+    &["budget", "client", "convention", "error", "middleware", "wire"],
+    &["limits", "listen", "viewer"],
+    &["atlas_slots", "health_check", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],
     &["connect", "memory", "objects", "track"],

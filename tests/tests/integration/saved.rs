@@ -154,19 +154,6 @@ async fn an_object_out_of_memory_is_found_again_by_its_name() {
     server.stop().await;
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_second_server_does_not_start_on_the_same_folder() {
-    let folder = Folder::absent("saved-twice");
-    let server = start(&folder, 10).await;
-    let config = config_for(&folder);
-    let second = tokio::task::spawn_blocking(|| Server::new(config)).await.unwrap();
-    let Err(ServeError::Store(error)) = second else {
-        panic!("two servers would overwrite each other's objects");
-    };
-    assert!(error.to_string().contains("another server"), "{error}");
-    server.stop().await;
-}
-
 async fn all_rigs(server: &TestServer) -> Vec<v1::HandRig> {
     let page = server
         .rigs()

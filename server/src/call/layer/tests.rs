@@ -67,6 +67,7 @@ impl Call {
 
 fn admitting_one() -> Calls {
     Calls {
+        faults: Faults::default(),
         in_flight: watch::Sender::new(()),
         uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),
@@ -123,6 +124,7 @@ async fn a_call_lasts_until_its_body_ends() {
 #[tokio::test]
 async fn calls_end_at_the_limit_but_streamed_uploads_do_not() {
     let calls = Calls {
+        faults: Faults::default(),
         longest_call: Duration::from_millis(5),
         ..admitting_one()
     };

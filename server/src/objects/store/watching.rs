@@ -13,9 +13,9 @@ use std::{
 use grasp_synthesis::model::hand::Handedness;
 use tokio::sync::Notify;
 
-use super::{Created, ObjectStore, RETRY_AFTER};
+use super::{Created, ObjectStore};
 use crate::{
-    error::{Limit, ServiceError},
+    error::ServiceError,
     objects::{Listed, StoredObject},
     validate::{Labels, ObjectFilter, WatchQuery},
 };
@@ -155,19 +155,12 @@ fn combine(events: &mut BTreeSet<Event>, event: Event) {
 
 impl ObjectStore {
     /// A watcher of events from this moment on.
-    pub(crate) fn watch(&self, query: WatchQuery, most: usize) -> Result<Arc<Watcher>, ServiceError> {
+    pub(crate) fn watch(&self, query: WatchQuery) -> Arc<Watcher> {
         let mut created = self.created();
         created.watchers.retain(|watcher| watcher.strong_count() > 0);
-        if created.watchers.len() >= most {
-            return Err(ServiceError::Overloaded {
-                limit: Limit::Watchers,
-                maximum: most,
-                retry_after: RETRY_AFTER,
-            });
-        }
         let watcher = Arc::new(Watcher::new(query));
         created.watchers.push(Arc::downgrade(&watcher));
-        Ok(watcher)
+        watcher
     }
 
     /// The next report to the watcher. `None` if there is nothing yet.
