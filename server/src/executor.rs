@@ -1,6 +1,6 @@
 //! The search pool: admits jobs, runs them off the async runtime, stops them, and contains their panics.
 //!
-//! Each job has a coordinating thread that waits for the workers, so that no thread of the async runtime blocks. The
+//! Each job has a coordinating thread that waits for its turns at the workers, so that no thread of the async runtime blocks. The
 //! workers' threads are named `grasp-search-N` and shared by all jobs.
 
 use std::{
@@ -10,10 +10,12 @@ use std::{
 };
 
 use futures_util::FutureExt as _;
+use grasp_admission::{Gate, Job, TooLate};
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::{
+    client::Client,
     error::{Limit, ServiceError},
     faults::{FaultPoint, Faults},
     limits::{Place, Places},
@@ -26,16 +28,66 @@ pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
+/// Jobs that have a turn at once: the second one keeps the workers busy while the first one begins or ends.
+const TURNS: usize = 2;
+
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
     pub faults: Faults,
     /// A place per running or waiting job.
     pub places: Places,
+    gate: Gate<Client>,
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
-pub(crate) type Admission = Place;
+#[derive(Debug)]
+pub(crate) struct Admission {
+    job: Arc<Job<Client>>,
+    _place: Place,
+}
+
+impl Admission {
+    /// Sets when the job has to end, and whether it goes on as long as there is time, for which others do not wait.
+    pub(crate) fn set_due(&self, due: Instant, yields: bool) {
+        self.job.set_due(due, yields);
+    }
+
+    /// Ends a job that needed no turn.
+    pub(crate) fn done(self) {
+        self.job.done();
+    }
+}
+
+/// The workers, as the job on this thread sees them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Workers<'a> {
+    pool: &'a ThreadPool,
+    /// `None` for a job that has the workers for itself.
+    job: Option<&'a Job<Client>>,
+}
+
+impl Workers<'_> {
+    #[cfg(test)]
+    pub(crate) fn alone(pool: &ThreadPool) -> Workers<'_> {
+        Workers { pool, job: None }
+    }
+
+    /// Does a slice of the job's work when its turn has come; at once if the job is over, which the work notices.
+    pub(crate) fn in_turn<T>(self, work: impl FnOnce(&ThreadPool) -> T) -> T {
+        let _turn = self.job.and_then(Job::turn);
+        work(self.pool)
+    }
+}
+
+/// Cancels a job when its call is dropped.
+struct Waiting(Arc<Job<Client>>);
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.0.cancel();
+    }
+}
 
 impl SearchExecutor {
     /// A pool of `workers` threads that admits up to `maximum` jobs.
@@ -50,6 +102,18 @@ impl SearchExecutor {
             pool: Arc::new(pool),
             faults: Faults::default(),
             places: Places::new(Limit::Searches, maximum, RETRY_AFTER),
+            gate: Gate::new(TURNS),
+        })
+    }
+
+    /// Admits a job that has to end when it is due, unless there is no place or too little time for it.
+    pub(crate) fn admit(&self, client: &Client, due: Instant) -> Result<Admission, ServiceError> {
+        let place = self.places.take(client)?;
+        let job = self.gate.admit(client.clone(), Instant::now(), due);
+        let job = job.map_err(|TooLate { expected }| ServiceError::WouldMissDeadline { expected })?;
+        Ok(Admission {
+            job: Arc::new(job),
+            _place: place,
         })
     }
 
@@ -57,24 +121,34 @@ impl SearchExecutor {
         self.pool.current_num_threads()
     }
 
-    /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
+    /// Runs a job and waits for it. The job gets the workers and is to stop when the returned future is dropped.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         admission: Admission,
-        job: impl FnOnce(&ThreadPool, Stop<'_>) -> T + Send + 'static,
+        job: impl FnOnce(Workers<'_>, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
         let (pool, faults) = (Arc::clone(&self.pool), self.faults.clone());
-        run_stoppable(None, move |stop| {
+        let _waiting = Waiting(Arc::clone(&admission.job));
+        run_blocking(move || {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
-            let _admission = admission;
+            let admission = admission;
+            let of_job = &*admission.job;
+            let workers = Workers {
+                pool: &pool,
+                job: Some(of_job),
+            };
             faults.at(FaultPoint::Coordinator);
             let is_over = || {
                 if rayon::current_thread_index().is_some() {
                     faults.at(FaultPoint::Worker);
                 }
-                stop.is_over()
+                of_job.is_cancelled()
             };
-            job(&pool, Stop::when(&is_over))
+            let output = job(workers, Stop::when(&is_over));
+            if !of_job.is_cancelled() {
+                of_job.done();
+            }
+            output
         })
         .await
     }
@@ -134,24 +208,29 @@ mod tests {
     use std::thread;
 
     use super::*;
-    use crate::client::Client;
 
     #[tokio::test]
     async fn panic_in_a_worker_ends_only_its_own_job() {
         let executor = SearchExecutor::new(2, 8).expect("threads start");
+        let admit = || {
+            let due = Instant::now() + Duration::from_mins(1);
+            executor.admit(&Client::Local, due).unwrap()
+        };
         for _ in 0..8 {
-            let bad = executor.run(executor.places.take(&Client::Local).unwrap(), |pool, _| {
-                pool.in_place_scope(|scope| {
-                    scope.spawn(|_| panic!("on purpose"));
-                    scope.spawn(|_| {});
+            let bad = executor.run(admit(), |workers, _| {
+                workers.in_turn(|pool| {
+                    pool.in_place_scope(|scope| {
+                        scope.spawn(|_| panic!("on purpose"));
+                        scope.spawn(|_| {});
+                    });
                 });
             });
-            let good = executor.run(executor.places.take(&Client::Local).unwrap(), |_, _| 7);
+            let good = executor.run(admit(), |_, _| 7);
             assert_eq!(tokio::join!(bad, good), (Err(ServiceError::Panicked), Ok(7)));
         }
         let threads = executor
-            .run(executor.places.take(&Client::Local).unwrap(), |pool, _| {
-                pool.broadcast(|_| thread::current().name().map(str::to_owned))
+            .run(admit(), |workers, _| {
+                workers.in_turn(|pool| pool.broadcast(|_| thread::current().name().map(str::to_owned)))
             })
             .await
             .unwrap();

@@ -194,7 +194,6 @@ impl Server {
             unstopped(|stop| object.derived_until(stop)?.prepare(&config.default_rig, stop));
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
-        let faults = executor.faults.clone();
         let atlas_files = match config.kept_atlases() {
             Some(path) => {
                 let opened = AtlasFiles::open(path.clone());
@@ -226,7 +225,6 @@ impl Server {
             deriving: Arc::new(Semaphore::new(config.derivations())),
             ahead: Semaphore::new(1),
             created: AtomicU64::new(0),
-            faults,
             upload_bytes: upload_places(config.streams.upload_bytes.get()),
             watchers: watcher_places(config.streams.watchers.get()),
             tracks: Arc::new(OpenTracks::new(config.streams.tracks.get())),
@@ -267,7 +265,7 @@ impl Server {
     /// Calls a closure at the points where tests inject faults.
     #[doc(hidden)]
     pub fn inject_faults(&self, hook: impl Fn(FaultPoint) + Send + Sync + 'static) {
-        self.handler.faults.set(Box::new(hook));
+        self.handler.executor.faults.set(Box::new(hook));
     }
 
     /// The server's activity.
@@ -319,7 +317,7 @@ impl Server {
             builds,
         } = self;
         let config = &handler.config;
-        let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
+        let largest_upload = largest_upload(config);
         let grasps = GraspServiceServer::new(handler.clone())
             .accept_compressed(Gzip)
             .max_decoding_message_size(MAX_FIND_REQUEST)
@@ -371,16 +369,7 @@ impl Server {
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(Around(Calls {
-                in_flight: handler.calls.clone(),
-                faults: handler.faults.clone(),
-                uploads: builds,
-                upload_grace: 2 * config.streams.upload_idle,
-                packers: Arc::clone(&packers),
-                largest_upload,
-                reserve: Arc::clone(&handler.reserve),
-                longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
-            }))
+            .layer(Around(calls(&handler, builds, &packers)))
             .layer(Around(Transcoding {
                 largest_upload,
                 places: packers,
@@ -463,6 +452,27 @@ fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+}
+
+/// Largest message of an upload, in bytes.
+fn largest_upload(config: &Config) -> usize {
+    config.maximum_object_bytes.get() + BYTES_BESIDES_MESH
+}
+
+fn calls(handler: &Handler, builds: Places, packers: &Arc<Semaphore>) -> Calls {
+    let config = &handler.config;
+    Calls {
+        in_flight: handler.calls.clone(),
+        executor: handler.executor.clone(),
+        longest_search: config.budgets.maximum,
+        uploads: builds,
+        reads: Arc::default(),
+        upload_grace: 2 * config.streams.upload_idle,
+        packers: Arc::clone(packers),
+        largest_upload: largest_upload(config),
+        reserve: Arc::clone(&handler.reserve),
+        longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
+    }
 }
 
 async fn set_health(health: &HealthReporter, status: ServingStatus) {

@@ -15,15 +15,16 @@ use super::{
     CallContext, OpenCall,
     packing::{accepts_gzip, packing},
     panics::contained,
+    reads::{Reads, WaitingRead, is_read},
     upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
 use crate::{
     budget::{DeadlineReserve, parse_grpc_timeout},
     client::Client,
     error::{ServiceError, blame_client},
-    faults::Faults,
-    limits::{MAX_FIND_REQUEST, Places},
-    middleware::{Answer, Middleware},
+    executor::SearchExecutor,
+    limits::{MAX_FIND_REQUEST, Places, locked},
+    middleware::{Answer, Middleware, filtered},
     net::{Reader, arriving},
 };
 
@@ -33,6 +34,14 @@ const UPLOAD_METHODS: [&str; 4] = [
     "/grasp.v1.ObjectService/UpdateObject",
     STREAMED_UPLOAD,
     "/grasp.v1.HandRigService/CreateRig",
+];
+
+/// Methods that search.
+const SEARCH_METHODS: [&str; 4] = [
+    "/grasp.v1.GraspService/FindGrasp",
+    "/grasp.v1.GraspService/StreamGrasps",
+    "/grasp.v1.GraspService/ValidateGrasp",
+    "/grasp.v1.GraspService/EvaluateHoldout",
 ];
 
 /// Path of the upload in pieces, which limits its own time.
@@ -59,9 +68,14 @@ pub(crate) fn is_upload(path: &str) -> bool {
 pub(crate) struct Calls {
     /// Has a receiver per call in flight.
     pub in_flight: watch::Sender<()>,
-    pub faults: Faults,
+    /// Admits searches.
+    pub executor: SearchExecutor,
+    /// Longest time of a search.
+    pub longest_search: Duration,
     /// One place per concurrent upload.
     pub uploads: Places,
+    /// Lets calls that read or delete take turns.
+    pub reads: Arc<Reads>,
     /// Longest pause in an upload.
     pub upload_grace: Duration,
     /// One permit per thread that packs messages.
@@ -75,6 +89,17 @@ pub(crate) struct Calls {
 }
 
 impl Calls {
+    /// Admits a search, or a call that reads or deletes, which then waits for its turn.
+    fn admit(&self, path: &str, context: &CallContext) -> Result<Option<WaitingRead>, ServiceError> {
+        let client = &context.client;
+        if SEARCH_METHODS.contains(&path) {
+            let due = context.latest_end(self.longest_search);
+            let admission = self.executor.admit(client, due)?;
+            *locked(&context.record.admission) = Some(admission);
+        }
+        is_read(path).then(|| self.reads.enter(client)).transpose()
+    }
+
     /// When and with which error an unanswered call ends.
     fn end(&self, path: &str, context: &CallContext) -> Option<(Instant, ServiceError)> {
         let before = |deadline: Instant| deadline.checked_sub(BEFORE_TRANSPORT).unwrap_or(deadline);
@@ -110,6 +135,11 @@ impl Middleware<Body> for Calls {
             Ok(place) => place,
             Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
         };
+        // Refused before the message is read, which costs more than the refusal.
+        let admitted = match self.admit(path, &context) {
+            Ok(admitted) => admitted,
+            Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
+        };
         let end = self.end(path, &context);
         let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads, context.client.clone()));
         // Beyond these bytes, an upload has a place and needs no other bound.
@@ -125,11 +155,19 @@ impl Middleware<Body> for Calls {
             let grace = self.upload_grace;
             request = request.map(|body| bounded_upload(body, permit, grace));
         }
-        let answer = contained(next(request), self.faults.clone());
+        let answer = contained(next(request), self.executor.faults.clone());
         let packers = Arc::clone(&self.packers);
         let answer = async move {
+            let turn = match admitted {
+                Some(read) => Some(read.turn().await),
+                None => None,
+            };
             let answer = answer.await?;
             drop(place);
+            let answer = match turn {
+                Some(turn) => answer.map(|inner| filtered(inner, turn)),
+                None => answer,
+            };
             Ok(match reader.map_or(Ok(()), |reader| reader.admit()) {
                 Err(error) => refusal(error),
                 Ok(()) if packs => packing(answer, packers),

@@ -6,10 +6,11 @@
 mod layer;
 mod packing;
 mod panics;
+mod reads;
 mod upload;
 
 use std::{
-    sync::{Arc, OnceLock},
+    sync::{Arc, Mutex, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
@@ -26,6 +27,8 @@ pub(crate) use self::{
 use crate::{
     budget::DeadlineReserve,
     client::Client,
+    executor::Admission,
+    limits::locked,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
@@ -52,6 +55,8 @@ struct CallRecord {
     due: OnceLock<Instant>,
     /// When it ended.
     ended: OnceLock<Instant>,
+    /// The right to search, until the handler takes it.
+    admission: Mutex<Option<Admission>>,
 }
 
 /// Log record of a search.
@@ -89,6 +94,17 @@ impl CallContext {
             client,
             record: Arc::default(),
         }
+    }
+
+    /// The right to search that the call came with. Parts of a call have none.
+    pub(crate) fn take_admission(&self) -> Option<Admission> {
+        locked(&self.record.admission).take()
+    }
+
+    /// When a search that takes at most `longest` has to end.
+    pub(crate) fn latest_end(&self, longest: Duration) -> Instant {
+        let latest = self.arrived + longest;
+        self.deadline.map_or(latest, |deadline| deadline.min(latest))
     }
 
     /// When a call that is no search has to be answered, if it has a deadline.

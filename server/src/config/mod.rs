@@ -118,7 +118,7 @@ impl Default for Config {
                 upload_bytes: non_zero(256 << 20),
                 upload_idle: Duration::from_secs(10),
                 watchers: non_zero(64),
-                tracks: non_zero(200),
+                tracks: non_zero(256),
                 track_idle: Duration::from_secs(10),
             },
             maximum_object_bytes: non_zero(8 << 20),

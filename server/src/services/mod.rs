@@ -30,7 +30,6 @@ use crate::{
     config::Config,
     error::ServiceError,
     executor::{SearchExecutor, before, run_blocking, run_stoppable},
-    faults::Faults,
     limits::Places,
     net::UnreadAnswers,
     objects::{
@@ -74,7 +73,6 @@ pub(crate) struct Shared {
     /// One permit: new objects are prepared ahead of calls one at a time.
     pub ahead: Semaphore,
     pub created: AtomicU64,
-    pub faults: Faults,
 }
 
 /// Implements the services.

@@ -49,7 +49,7 @@ impl Handler {
         call: &CallContext,
         stop: Stop<'_>,
     ) -> Result<Listed, ServiceError> {
-        self.faults.at(FaultPoint::Build);
+        self.executor.faults.at(FaultPoint::Build);
         let violations = Violations::default();
         let mut fields = object_fields(request, limits.bytes, &violations);
         let mut origin = Origin {

@@ -47,7 +47,7 @@ where
 {
     let (sender, receiver) = mpsc::channel(QUEUED);
     let producing = produce(MessageSender(sender.clone()));
-    let (shutdown, faults) = (shared.shutdown.clone(), shared.faults.clone());
+    let (shutdown, faults) = (shared.shutdown.clone(), shared.executor.faults.clone());
     let producing = contained(async move {
         faults.at(FaultPoint::Stream);
         producing.await

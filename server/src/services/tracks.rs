@@ -151,7 +151,7 @@ async fn read(
     call: &CallContext,
     shared: &Shared,
 ) -> Result<(), ServiceError> {
-    shared.faults.at(FaultPoint::Frames);
+    shared.executor.faults.at(FaultPoint::Frames);
     while let Some(request) = frames.message().await.map_err(|status| broken(&status))? {
         match request.message {
             Some(Message::Frame(frame)) => put(inbox, frame, call.of_part(Instant::now()), None, shared)?,
@@ -330,7 +330,7 @@ impl Track {
         call: &CallContext,
     ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &*self.handler;
-        shared.faults.at(FaultPoint::Frame);
+        shared.executor.faults.at(FaultPoint::Frame);
         self.holding.hold(&mut frame, at, &self.policy, &shared.rigs)?;
         let object = shared.object(&self.object_id, call).await?.object;
         self.held = object.hold();

@@ -13,9 +13,9 @@ use std::{
 const SERVER: &[&[&str]] = &[
     &["budget", "client", "convention", "error", "middleware", "wire"],
     &["limits", "listen", "viewer"],
-    &["atlas_slots", "health_check", "net", "saved", "web"],
+    &["atlas_slots", "executor", "health_check", "net", "saved", "web"],
     &["rigs"],
-    &["answer", "call", "config", "executor", "validate"],
+    &["answer", "call", "config", "validate"],
     &["connect", "memory", "objects", "track"],
     &["atlases"],
     &["search"],

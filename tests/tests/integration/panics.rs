@@ -80,22 +80,14 @@ impl Call {
             Self::Get => _ = get(server, "objects/remote").await?,
             Self::Find => _ = grasps.find_grasp(search()).await?,
             Self::Validate => {
-                let v1::FindGraspRequest { holdout, .. } = search();
                 let hand = v1::HandPose::new("rigs/adult", v1::Handedness::Right)
-                    .with_client_from_wrist(v1::Pose::default());
-                let request = v1::ValidateGraspRequest {
-                    holdout,
-                    ..v1::ValidateGraspRequest::new(hand)
-                };
+                    .with_client_from_wrist(v1::Pose::default())
+                    .with_digits([Some(v1::DigitAngles::new([0.0, 0.2, 0.2, 0.2])); 5]);
+                let request = v1::ValidateGraspRequest::from(search()).with_pose(hand);
                 _ = grasps.validate_grasp(request).await?;
             }
             Self::Evaluate => {
-                let v1::FindGraspRequest { holdout, search, .. } = search();
-                let request = v1::EvaluateHoldoutRequest {
-                    holdout,
-                    search,
-                    ..Default::default()
-                };
+                let request = v1::EvaluateHoldoutRequest::from(search());
                 _ = grasps.evaluate_holdout(request).await?;
             }
             Self::Create => {
@@ -176,6 +168,7 @@ async fn every_panic_fails_its_call_and_no_other_and_costs_no_place() {
         let mut armed = of_hook.lock().unwrap_or_else(PoisonError::into_inner);
         if *armed == Some(point) {
             *armed = None;
+            drop(armed);
             count.fetch_add(1, Ordering::Relaxed);
             std::panic::panic_any(ON_PURPOSE);
         }

@@ -67,8 +67,10 @@ impl Call {
 
 fn admitting_one() -> Calls {
     Calls {
-        faults: Faults::default(),
         in_flight: watch::Sender::new(()),
+        executor: SearchExecutor::new(1, 8).expect("a thread starts"),
+        longest_search: Duration::from_secs(10),
+        reads: Arc::default(),
         uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),
         reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
@@ -124,7 +126,6 @@ async fn a_call_lasts_until_its_body_ends() {
 #[tokio::test]
 async fn calls_end_at_the_limit_but_streamed_uploads_do_not() {
     let calls = Calls {
-        faults: Faults::default(),
         longest_call: Duration::from_millis(5),
         ..admitting_one()
     };
