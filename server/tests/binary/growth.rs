@@ -15,7 +15,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus as Random;
 use tokio::task::JoinSet;
 use tonic::{
-    Status,
+    Code, Status,
     transport::{Channel, Endpoint},
 };
 
@@ -37,7 +37,7 @@ const MAX_BESIDES: usize = 64 << 20;
 const MAX_GROWTH: usize = 10 << 20;
 
 /// How long a use may take before the test calls it a hang.
-const HANGS_AFTER: Duration = Duration::from_secs(60);
+const HANGS_AFTER: Duration = Duration::from_mins(5);
 
 /// Samples of memory at each end, of which the medians are compared.
 const SAMPLES: usize = 10;
@@ -48,6 +48,8 @@ fn start(more: &[(&str, &str)]) -> Running {
         ("GRASP_LOG", "warn,grasp_server=info,grasp_server::call=off"),
         ("GRASP_CACHE_BYTES", "67108864"),
         ("GRASP_CACHE_OBJECTS", "100"),
+        // All clients are one to the server, by their address.
+        ("GRASP_MAXIMUM_UPLOADS", "16"),
     ];
     Running::start(&[&limits[..], more].concat())
 }
@@ -136,6 +138,12 @@ fn frame(sequence: u64) -> v1::TrackFrame {
     v1::TrackFrame::of(sequence, holdout).captured_at(Duration::from_micros(11_111 * sequence))
 }
 
+/// True if a status says that there was too little time, or too much work.
+fn is_refusal(status: &Status) -> bool {
+    let is_late_track = status.code() == Code::NotFound && status.message().starts_with("tracks/");
+    is_late_track || matches!(status.code(), Code::DeadlineExceeded | Code::ResourceExhausted)
+}
+
 /// One use of the server, of any kind, on a connection of its own now and then.
 async fn use_once(
     address: &str,
@@ -195,6 +203,12 @@ async fn use_once(
                 .await?;
         }
         5 => {
+            let deletion = v1::DeleteObjectRequest {
+                name: name.clone(),
+                allow_missing: true,
+                ..Default::default()
+            };
+            objects.delete_object(deletion.clone()).await?;
             let cells = random.random_range(2..20);
             objects
                 .create_object(hills(&name["objects/".len()..], cells))
@@ -208,14 +222,9 @@ async fn use_once(
             objects
                 .update_object(v1::UpdateObjectRequest::new(heavier, []))
                 .await?;
-            let _ = grasps
-                .find_grasp(v1::FindGraspRequest::new(&name).with_budget(Duration::from_millis(20)))
-                .await?;
-            let request = v1::DeleteObjectRequest {
-                name,
-                ..Default::default()
-            };
-            objects.delete_object(request).await?;
+            let find = v1::FindGraspRequest::new(name).with_budget(Duration::from_millis(20));
+            grasps.find_grasp(find).await?;
+            objects.delete_object(deletion).await?;
         }
         6 => {
             // Given up.
@@ -259,8 +268,11 @@ async fn a_mixed_load_makes_the_server_grow_no_further_once_it_is_warm() {
             while begun.elapsed() < time {
                 let used = use_once(&address, &mut channel, client, &mut random);
                 let used = tokio::time::timeout(HANGS_AFTER, used).await;
-                used.expect("it hangs").expect("it is served");
-                uses += 1;
+                match used.expect("it hangs") {
+                    Ok(()) => uses += 1,
+                    // A busy machine may not be in time.
+                    Err(status) => assert!(is_refusal(&status), "{status:?}"),
+                }
                 // Leaves the machine to others most of the time.
                 tokio::time::sleep(Duration::from_millis(40)).await;
             }

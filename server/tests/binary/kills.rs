@@ -235,6 +235,7 @@ fn start(folder: &Folder) -> Running {
         ("GRASP_LISTEN", "127.0.0.1:0"),
         ("GRASP_STORE", folder.path()),
         ("GRASP_BUILDER_THREADS", "0"),
+        ("GRASP_MAXIMUM_UPLOADS", "16"),
         ("GRASP_LOG", "warn,grasp_server=info,grasp_server::call=off"),
     ])
 }

@@ -11,7 +11,15 @@ use std::{
 
 /// The server's top-level modules, as documented in its `lib.rs`.
 const SERVER: &[&[&str]] = &[
-    &["budget", "client", "convention", "error", "middleware", "wire"],
+    &[
+        "budget",
+        "client",
+        "convention",
+        "error",
+        "faults",
+        "middleware",
+        "wire",
+    ],
     &["limits", "listen", "viewer"],
     &["atlas_slots", "executor", "health_check", "net", "saved", "web"],
     &["rigs"],
