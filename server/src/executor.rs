@@ -4,10 +4,12 @@
 //! workers' threads are named `grasp-search-N` and shared by all jobs.
 
 use std::{
+    panic::AssertUnwindSafe,
     sync::Arc,
     time::{Duration, Instant},
 };
 
+use futures_util::FutureExt as _;
 use grasp_admission::{Gate, Job, TooLate};
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
@@ -16,6 +18,7 @@ use tokio::sync::OwnedSemaphorePermit;
 use crate::{
     client::Client,
     error::{Limit, ServiceError},
+    faults::{FaultPoint, Faults},
     limits::{Place, Places},
 };
 
@@ -32,6 +35,7 @@ const TURNS: usize = 1;
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
+    pub faults: Faults,
     /// A place per running or waiting job.
     pub places: Places,
     gate: Gate<Client>,
@@ -112,6 +116,7 @@ impl SearchExecutor {
             .build()?;
         Ok(Self {
             pool: Arc::new(pool),
+            faults: Faults::default(),
             places: Places::new(Limit::Searches, maximum, RETRY_AFTER),
             gate: Gate::new(TURNS),
         })
@@ -139,7 +144,7 @@ impl SearchExecutor {
         admission: Admission,
         job: impl FnOnce(Workers<'_>, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let pool = Arc::clone(&self.pool);
+        let (pool, faults) = (Arc::clone(&self.pool), self.faults.clone());
         let _waiting = Waiting(Arc::clone(&admission.job));
         run_blocking(move || {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
@@ -149,7 +154,14 @@ impl SearchExecutor {
                 pool: &pool,
                 job: Some(of_job),
             };
-            let output = job(workers, Stop::when(&|| of_job.is_cancelled()));
+            faults.at(FaultPoint::Coordinator);
+            let is_over = || {
+                if rayon::current_thread_index().is_some() {
+                    faults.at(FaultPoint::Worker);
+                }
+                of_job.is_cancelled()
+            };
+            let output = job(workers, Stop::when(&is_over));
             if !of_job.is_cancelled() {
                 of_job.done();
             }
@@ -184,6 +196,14 @@ pub(crate) async fn before<T>(
             ended.map_err(|_| ServiceError::DeadlineExceeded)
         }
     }
+}
+
+/// The output of a future, or [`ServiceError::Panicked`]. For work whose values are dropped after a panic.
+pub(crate) async fn contained<T>(
+    future: impl Future<Output = Result<T, ServiceError>>,
+) -> Result<T, ServiceError> {
+    let output = AssertUnwindSafe(future).catch_unwind().await;
+    output.unwrap_or(Err(ServiceError::Panicked))
 }
 
 /// Runs blocking work away from the threads of the async runtime.

@@ -19,14 +19,14 @@
 //!
 //! Before serving, `memory` and `open_files` compare the configured limits with those of the process, and `objects::directory` loads
 //! the folder of objects. Between calls, `atlases` builds atlases in the background.
-//! `health_check` is a client: it asks a running server for its health.
+//! `health_check` is a client: it asks a running server for its health. `faults` are those that tests inject.
 //!
 //! # Order of modules
 //!
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  client  convention  error  middleware  reload  wire
+//! budget  client  convention  error  faults  middleware  reload  wire
 //! limits  listen  tls  viewer
 //! access  atlas_slots  executor  health_check  net  saved  web
 //! rigs
@@ -54,6 +54,7 @@ mod connect;
 mod convention;
 mod error;
 mod executor;
+mod faults;
 mod health_check;
 mod limits;
 mod listen;
@@ -78,6 +79,8 @@ mod wire;
 pub use access::new_token;
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
+#[doc(hidden)]
+pub use faults::FaultPoint;
 pub use health_check::check_health;
 pub use limits::{StoreLimits, StreamLimits};
 pub use listen::{ListenAddress, Listener};

@@ -16,6 +16,7 @@ use grasp_server::{
     config::{LogFormat, RawConfig, read_file, unknown_variables},
     fit_open_files, is_reserved_memory_limited, new_token, warn_of_memory,
 };
+use rustix::fs::Mode;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::{
     Registry, filter::Targets, fmt, layer::SubscriberExt as _, reload, util::SubscriberInitExt as _,
@@ -114,6 +115,8 @@ fn start(flags: &Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
         runtime.block_on(check_health(&config.listen, config.tls.is_some()))?;
         return Ok(ExitCode::SUCCESS);
     }
+    // Files of the store are private from their first moment, even where a library creates them.
+    rustix::process::umask(Mode::RWXG | Mode::RWXO);
     let arenas = limit_arenas();
     let log_filter = start_log(&config)?;
     if let Err(error) = arenas {

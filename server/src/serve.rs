@@ -34,6 +34,7 @@ use crate::{
     connect::{Connect, Transcoding},
     error::Limit,
     executor::SearchExecutor,
+    faults::FaultPoint,
     limits::{BYTES_BESIDES_MESH, ClientPermits, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
     listen::Listener,
     middleware::Around,
@@ -98,6 +99,8 @@ pub enum ServeError {
 #[derive(Debug)]
 pub struct Server {
     handler: Handler,
+    /// `None` if nothing is saved.
+    files: Option<Arc<SavedFiles>>,
     builds: Places,
     tls: Option<Arc<Tls>>,
     door: Arc<Door>,
@@ -195,11 +198,13 @@ impl Server {
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let atlas_files = match config.kept_atlases() {
             Some(path) => {
-                let opened = AtlasFiles::open(path.clone(), config.atlas_directory.is_none());
+                let opened = AtlasFiles::open(path.clone());
                 Some(opened.map_err(|source| ServeError::AtlasDirectory { path, source })?)
             }
             None => None,
         };
+        let models = config.maximum_object_bytes.get();
+        let rig_records = files.clone().map(|files| saved_rigs(files, models));
         let builds = Places::new(Limit::Uploads, config.maximum_uploads.get(), RETRY_UPLOAD_AFTER);
         let shared = Shared {
             atlases: Atlases::start(
@@ -211,7 +216,7 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
+            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), rig_records)),
             resizer: Resizer(Arc::new(Semaphore::new(config.derivations()))),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
@@ -237,6 +242,7 @@ impl Server {
         };
         Ok(Self {
             handler: Handler(Arc::new(shared)),
+            files,
             builds,
             tls,
             door,
@@ -252,6 +258,9 @@ impl Server {
             config,
             ..
         } = &*self.handler;
+        if let Some(files) = &self.files {
+            files.own().await?;
+        }
         let objects = objects.read_saved().await?;
         let rigs = load_saved_rigs(rigs, config.mesh_limits(config.maximum_object_bytes)).await?;
         let (store, milliseconds) = (&config.place, start.elapsed().as_millis());
@@ -261,6 +270,12 @@ impl Server {
             tracing::info!(%store, objects, rigs, milliseconds, "created objects and rigs are saved");
         }
         Ok(())
+    }
+
+    /// Calls a closure at the points where tests inject faults.
+    #[doc(hidden)]
+    pub fn inject_faults(&self, hook: impl Fn(FaultPoint) + Send + Sync + 'static) {
+        self.handler.executor.faults.set(Box::new(hook));
     }
 
     /// The server's activity.
@@ -305,9 +320,15 @@ impl Server {
         listeners: Vec<Listener>,
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
-        self.read_saved().await?;
+        if let Err(error) = self.read_saved().await {
+            if let Some(files) = &self.files {
+                files.give_back().await;
+            }
+            return Err(error.into());
+        }
         let Self {
             handler,
+            files,
             builds,
             tls,
             door,
@@ -395,11 +416,21 @@ impl Server {
             close.cancel();
             std::future::pending::<()>().await;
         };
+        let lost = async {
+            match &files {
+                Some(files) => files.lost().await,
+                None => std::future::pending().await,
+            }
+        };
         tokio::select! {
             () = serving => {}
             () = handler.connections.close_stalled() => {}
             () = keep_current(watched, reloader) => {}
+            lost = lost => return Err(lost.into()),
             () = shutting_down => {}
+        }
+        if let Some(files) = &files {
+            files.give_back().await;
         }
         tracing::info!("stopped");
         Ok(())

@@ -7,7 +7,7 @@ use grasp_proto::v1::{
     self, grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
     object_service_client::ObjectServiceClient,
 };
-use grasp_server::{Config, Gauges, Reloader, ServeError, Server, config::StorePlace};
+use grasp_server::{Config, FaultPoint, Gauges, Reloader, ServeError, Server, config::StorePlace};
 use grasp_synthesis::base::pose::Pose;
 use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
@@ -40,6 +40,22 @@ impl TestServer {
 
     /// Starts a server on another address of this machine.
     pub async fn start_on(address: IpAddr, adapt: impl FnOnce(&mut Config)) -> Self {
+        Self::start_faulty_on(address, adapt, |_| {}).await
+    }
+
+    /// The same as [`Self::start_with`], with a hook that injects faults.
+    pub async fn start_faulty(
+        adapt: impl FnOnce(&mut Config),
+        hook: impl Fn(FaultPoint) + Send + Sync + 'static,
+    ) -> Self {
+        Self::start_faulty_on(Ipv6Addr::LOCALHOST.into(), adapt, hook).await
+    }
+
+    async fn start_faulty_on(
+        address: IpAddr,
+        adapt: impl FnOnce(&mut Config),
+        hook: impl Fn(FaultPoint) + Send + Sync + 'static,
+    ) -> Self {
         let mut config = Config {
             workers: WORKERS.try_into().expect("there are workers"),
             builder_threads: 0,
@@ -53,6 +69,7 @@ impl TestServer {
         let address = listener.local_addr().expect("a bound socket has an address");
         let scheme = if config.tls.is_some() { "https" } else { "http" };
         let server = Server::new(config).expect("the server starts");
+        server.inject_faults(hook);
         let (gauges, reloader) = (server.gauges(), server.reloader());
         let stop = CancellationToken::new();
         let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));

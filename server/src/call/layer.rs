@@ -14,6 +14,7 @@ use tower::Service;
 use super::{
     CallContext, OpenCall,
     packing::{accepts_gzip, packing},
+    panics::contained,
     reads::{Reads, is_read},
     upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
@@ -170,7 +171,7 @@ impl Middleware<Body> for Calls {
             let grace = self.upload_grace;
             request = request.map(|body| bounded_upload(body, permit, grace));
         }
-        let answer = next(request);
+        let answer = contained(next(request), self.executor.faults.clone());
         let (packers, reads) = (Arc::clone(&self.packers), Arc::clone(&self.reads));
         let answer = async move {
             let turn = match admitted {

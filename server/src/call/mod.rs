@@ -5,6 +5,7 @@
 
 mod layer;
 mod packing;
+mod panics;
 mod reads;
 mod upload;
 

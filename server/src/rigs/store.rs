@@ -19,7 +19,11 @@ use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
     access::{Caller, Owner},
     error::ServiceError,
-    saved::{FieldMove, RIGS, Records, SavedFiles, Unreadable, field, message, move_fields, seal, wait_for},
+    limits::BYTES_BESIDES_MESH,
+    saved::{
+        FieldMove, RIGS, Records, SavedFiles, Unreadable, are_few, field, message, move_fields, seal,
+        wait_for,
+    },
 };
 
 /// All rigs.
@@ -40,6 +44,9 @@ pub(crate) struct RigStore {
 
 /// The rigs that clients created by id; `None` if the record is damaged or missing.
 type CreatedRigs = BTreeMap<String, Option<Arc<StoredRig>>>;
+
+/// The id and the rig; `None` if its record is damaged or missing.
+pub(crate) type ListedRig = (String, Option<Arc<StoredRig>>);
 
 impl RigStore {
     /// A store of the built-in rigs that keeps up to `maximum` created ones, which outlast it if they are saved.
@@ -193,15 +200,16 @@ impl RigStore {
         Ok(())
     }
 
-    /// Up to `size` rigs ordered by name, starting after `after`, and whether there are more.
-    pub(crate) fn page(&self, after: Option<&str>, size: usize) -> (Vec<Arc<StoredRig>>, bool) {
+    /// Up to `size` rigs ordered by name, starting after `after`, and whether there are more. Of a damaged one, only the id is known.
+    pub(crate) fn page(&self, after: Option<&str>, size: usize) -> (Vec<ListedRig>, bool) {
         let from = (after.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded);
         let created = self.created();
-        let built_in = self.built_in.range::<str, _>(from).map(|(_, rig)| rig);
-        let created = created.range::<str, _>(from).filter_map(|(_, rig)| rig.as_ref());
-        let rigs = built_in.take(size + 1).chain(created.take(size + 1));
-        let mut rigs: Vec<_> = rigs.map(Arc::clone).collect();
-        rigs.sort_by(|a, b| a.id.cmp(&b.id));
+        let built_in = self.built_in.range::<str, _>(from);
+        let built_in = built_in.map(|(id, rig)| (id.clone(), Some(Arc::clone(rig))));
+        let created = created.range::<str, _>(from);
+        let created = created.map(|(id, rig)| (id.clone(), rig.clone()));
+        let mut rigs: Vec<_> = built_in.take(size + 1).chain(created.take(size + 1)).collect();
+        rigs.sort_by(|(a, _), (b, _)| a.cmp(b));
         let more = rigs.len() > size;
         rigs.truncate(size);
         (rigs, more)
@@ -239,11 +247,9 @@ fn built_in(name: &str) -> Option<StoredRig> {
     })
 }
 
-/// Largest record in bytes: more than the largest model that a server can be configured to take.
-const MAX_RECORD: u64 = 1 << 30;
-
-pub(crate) fn saved_rigs(files: Arc<SavedFiles>) -> Records {
-    Records::new(files, RIGS, MAX_RECORD)
+/// The records of rigs whose models have up to so many bytes together.
+pub(crate) fn saved_rigs(files: Arc<SavedFiles>, models: usize) -> Records {
+    Records::new(files, RIGS, (models + 2 * BYTES_BESIDES_MESH) as u64)
 }
 
 /// The request that made a rig, and its owner. The inner error is why its record cannot be read.
@@ -274,6 +280,10 @@ struct SavedRig {
     owner: String,
 }
 
+/// The request in a record, and its lists: hands with joints, the map of joints, and limits.
+const NOW: usize = 10;
+const LISTS: [&[usize]; 4] = [&[3], &[3, 2], &[4], &[5]];
+
 /// The places of a version 0.1 record's fields in a request.
 const REQUEST: &[FieldMove] = &[
     field(1, &[1]),
@@ -297,10 +307,14 @@ const LIMITS: &[FieldMove] = &[
 ];
 
 fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
+    if !are_few(record, &[NOW], &LISTS) {
+        return None;
+    }
     if let Some(request) = SavedRig::decode(record).ok()?.request {
         return Some(request);
     }
-    let mut request = v1::CreateRigRequest::decode(&*move_fields(record, REQUEST)?).ok()?;
+    let request = move_fields(record, REQUEST).filter(|request| are_few(request, &[], &LISTS))?;
+    let mut request = v1::CreateRigRequest::decode(&*request).ok()?;
     for (place, limits) in (1..).zip(&mut request.limits) {
         if limits.digit == 0 {
             limits.digit = place;
@@ -334,7 +348,7 @@ mod tests {
         assert_eq!(store.insert(rig("c"), None).unwrap_err(), full);
         store.delete("a").unwrap();
         store.insert(rig("c"), None).unwrap();
-        let listed: Vec<String> = store.page(None, 10).0.iter().map(|rig| rig.id.clone()).collect();
+        let listed: Vec<String> = store.page(None, 10).0.into_iter().map(|(id, _)| id).collect();
         assert_eq!(listed, ["adult", "b", "c", "thesis"]);
     }
 

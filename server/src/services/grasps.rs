@@ -211,7 +211,7 @@ impl GraspService for Handler {
         let StreamQuery { find, sent } = stream_query(request, self.known_rigs(), self.exists())?;
         let ready = self.ready(find, &call).await?;
         let handler = self.clone();
-        let messages = messages(self.shutdown.clone(), |sender| async move {
+        let messages = messages(self, |sender| async move {
             handler.send_found(sent, ready, &call, sender).await
         });
         Ok(Response::new(messages))

@@ -184,7 +184,7 @@ impl Handler {
         let place = self.watchers.take(&call.client)?;
         let watcher = self.objects.watch(query);
         let handler = self.clone();
-        Ok(messages(self.shutdown.clone(), |sender| async move {
+        Ok(messages(self, |sender| async move {
             let _place = place;
             loop {
                 match handler.objects.next_report(&watcher)? {

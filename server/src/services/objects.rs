@@ -15,6 +15,7 @@ use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
+    faults::FaultPoint,
     limits::MAX_RESPONSE,
     objects::{
         Listed,
@@ -49,6 +50,7 @@ impl Handler {
         call: &CallContext,
         stop: Stop<'_>,
     ) -> Result<Listed, ServiceError> {
+        self.executor.faults.at(FaultPoint::Build);
         let violations = Violations::default();
         let mut fields = object_fields(request, limits.bytes, &violations);
         let mut origin = Origin {

@@ -1,6 +1,6 @@
 //! `HandRigService`, and rigs made from its checked requests.
 
-use std::{sync::Arc, time::Duration};
+use std::{fmt, sync::Arc, time::Duration};
 
 use glam::Vec3;
 use grasp_assets::hands::{self, Hand};
@@ -75,8 +75,14 @@ impl HandRigService for Handler {
         let (rigs, more) = self.rigs.page(query.after.as_deref(), query.size);
         let last = rigs.last().filter(|_| more);
         Ok(Response::new(v1::ListRigsResponse {
-            next_page_token: last.map(|last| rig_page_token(&last.id)).unwrap_or_default(),
-            rigs: rigs.iter().map(|rig| rig_message(rig)).collect(),
+            next_page_token: last.map(|(id, _)| rig_page_token(id)).unwrap_or_default(),
+            rigs: rigs
+                .iter()
+                .map(|(id, rig)| {
+                    rig.as_ref()
+                        .map_or_else(|| damaged_message(id), |rig| rig_message(rig))
+                })
+                .collect(),
         }))
     }
 
@@ -137,6 +143,16 @@ fn rig_message(rig: &StoredRig) -> v1::HandRig {
             .map(|(hand, mirrored)| wire_hand(hand, mirrored))
             .collect(),
         warnings: rig.warnings.clone(),
+    }
+}
+
+/// A rig of which only the name is known.
+fn damaged_message(id: &str) -> v1::HandRig {
+    let warning = "its record is damaged or missing; put the file back, or delete the rig";
+    v1::HandRig {
+        name: name_of(id),
+        warnings: vec![warning.to_owned()],
+        ..Default::default()
     }
 }
 
@@ -383,6 +399,7 @@ async fn saved_rig(
     let read = saved_request(saved, id).await;
     let (request, owner) = match read.map_err(|error| saved.error(&error))? {
         Ok(read) => read,
+        Err(Unreadable::Size) => return Err(unloadable(saved, id, &Unreadable::Size)),
         Err(wrong) => return Ok(Err(wrong)),
     };
     let made = run_blocking(move || {
@@ -397,7 +414,7 @@ async fn saved_rig(
 }
 
 /// The error of a rig that is beyond the limits of this server.
-fn unloadable(saved: &Records, id: &str, error: &ServiceError) -> StoreError {
+fn unloadable(saved: &Records, id: &str, error: &dyn fmt::Display) -> StoreError {
     let name = name_of(id);
     saved.error(&format_args!(
         "{name} was saved, but this server cannot load it: {error}; raise its limits"

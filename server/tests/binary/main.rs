@@ -1,13 +1,17 @@
-//! The binary: exit codes, messages, signals, health checks, and limits on memory and files.
+//! The binary: exit codes, messages, signals, health checks, kills, and limits on memory and files.
 #![cfg(target_os = "linux")]
 
 mod bombs;
+mod forged;
+mod growth;
+mod kills;
 mod stress;
 
 use std::{
     fs,
     io::{BufRead, BufReader},
     net::{Ipv4Addr, TcpListener},
+    os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
     process::{Child, ChildStderr, Command, Stdio},
 };
@@ -126,6 +130,25 @@ impl Drop for Running {
         // It has already ended unless the test failed.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// A test's own folder, absent at first and removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn absent(test: &str) -> Self {
+        Self(std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id())))
+    }
+
+    fn path(&self) -> &str {
+        self.0.to_str().expect("the path is text")
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
     }
 }
 
@@ -353,17 +376,58 @@ fn a_new_token_s_secret_is_apart_from_its_entry() {
     assert!(entry.starts_with("[studio]\nsha256 = [\""), "{entry}");
 }
 
-#[test]
-fn objects_are_saved_in_the_users_folder_by_default() {
-    let home = std::env::temp_dir().join(format!("grasp-home-{}", std::process::id()));
-    let path = home.to_str().expect("the path is text");
-    let server = Running::start_command(DEFAULT_STORE, &[("HOME", path), ("GRASP_LISTEN", "127.0.0.1:0")]);
+/// Files and folders under a path that others than their user may use.
+fn open_to_others(path: &Path) -> Vec<String> {
+    // Unfinished files may be gone by now.
+    let Ok(about) = fs::symlink_metadata(path) else {
+        return Vec::new();
+    };
+    let mode = about.permissions().mode() & 0o777;
+    let is_open = mode & 0o077 != 0;
+    let own = is_open.then(|| format!("{mode:o} {}", path.display()));
+    let entries = fs::read_dir(path).into_iter().flatten().flatten();
+    let inner = entries.flat_map(|entry| open_to_others(&entry.path()));
+    own.into_iter().chain(inner).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn objects_are_saved_in_the_users_folder_by_default_and_private_at_every_moment() {
+    let home = Folder::absent("home");
+    let line = format!("umask 0; {DEFAULT_STORE}");
+    let server = Running::start_command(&line, &[("HOME", home.path()), ("GRASP_LISTEN", "127.0.0.1:0")]);
+    let folder = home.0.join(".local/share/grasp");
+    let mut client = stress::client(&server).await;
+    let creating = tokio::spawn(async move {
+        for number in 0..20 {
+            let request = stress::hills(&format!("o{number}"), 2);
+            client.create_object(request).await.expect("it is an object");
+        }
+    });
+    let mut looks = 0;
+    while !creating.is_finished() {
+        assert_eq!(open_to_others(&folder), [""; 0]);
+        looks += 1;
+    }
+    creating.await.expect("it did not panic");
     let log = server.start_log.clone() + &server.terminate().join("\n");
-    let folder = home.join(".local/share/grasp");
-    assert!(folder.join("objects").is_dir(), "{log}");
+    println!("looked {looks} times, with an umask of 0");
+    assert!(folder.join("objects/o19").is_file(), "{log}");
     let place = format!("store={}", folder.display());
     assert!(log.contains(&place), "{place} in {log}");
-    fs::remove_dir_all(&home).expect("it is there");
+}
+
+#[test]
+fn a_second_server_on_a_folder_is_told_who_uses_it() {
+    let folder = Folder::absent("owned");
+    let store = [("GRASP_STORE", folder.path()), ("GRASP_LISTEN", "127.0.0.1:0")];
+    let server = Running::start(&store);
+    let (code, text) = output("grasp-server", &store);
+    assert_eq!(code, 1);
+    let owner = format!("another server uses it (process {} on host ", server.child.id());
+    assert!(text.contains(&owner), "{text}");
+    // That of a killed one is free.
+    drop(server);
+    Running::start(&store).terminate();
 }
 
 #[test]

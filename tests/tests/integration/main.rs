@@ -16,6 +16,7 @@ mod module_order;
 mod network;
 mod objects;
 mod own_hands;
+mod panics;
 mod real_input;
 mod reported;
 mod saved;

@@ -16,6 +16,7 @@ const SERVER: &[&[&str]] = &[
         "client",
         "convention",
         "error",
+        "faults",
         "middleware",
         "reload",
         "wire",
