@@ -52,6 +52,11 @@ impl SearchExecutor {
         self.pool.current_num_threads()
     }
 
+    /// Runs work of microseconds on the pool, in its turn.
+    pub(crate) fn spawn(&self, work: impl FnOnce() + Send + 'static) {
+        self.pool.spawn(work);
+    }
+
     /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
     pub(crate) async fn run<T: Send + 'static>(
         &self,

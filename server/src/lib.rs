@@ -16,6 +16,9 @@
 //! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
 //! contents.
 //!
+//! `metrics` counts calls and searches, by the `methods` of the services, and `monitor` answers operators and probes on a port of its
+//! own. `warning_rate` bounds warnings that clients can cause.
+//!
 //! Before serving, `memory` compares the configured limits with those of the process, and `objects::directory` loads the folder
 //! of objects. Between calls, `atlases` builds atlases in the background.
 //! `health_check` is a client: it asks a running server for its health.
@@ -25,8 +28,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  client  convention  error  middleware  wire
-//! limits  listen  viewer
+//! budget  client  convention  error  methods  middleware  warning_rate  wire
+//! limits  listen  metrics  viewer
 //! atlas_slots  health_check  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
@@ -34,6 +37,7 @@
 //! atlases
 //! search
 //! services
+//! monitor
 //! serve
 //! ```
 //!
@@ -56,7 +60,10 @@ mod health_check;
 mod limits;
 mod listen;
 mod memory;
+mod methods;
+mod metrics;
 mod middleware;
+mod monitor;
 mod net;
 mod objects;
 mod rigs;
@@ -67,6 +74,7 @@ mod services;
 mod track;
 mod validate;
 mod viewer;
+mod warning_rate;
 mod web;
 mod wire;
 

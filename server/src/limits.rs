@@ -130,6 +130,11 @@ impl Places {
         })
     }
 
+    /// Number of all places.
+    pub(crate) fn maximum(&self) -> usize {
+        self.0.maximum
+    }
+
     pub(crate) fn taken(&self) -> usize {
         locked(&self.0.held).total
     }

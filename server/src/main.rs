@@ -169,6 +169,16 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
             tracing::info!("the viewer is at http://{address}/");
         }
     }
+    let server = match &config.metrics_listen {
+        Some(address) => {
+            let listener = Listener::bind(address).await;
+            let listener =
+                listener.map_err(|error| format!("cannot listen on {address} for metrics: {error}"))?;
+            tracing::info!(at = %listener.address()?, "metrics and probes");
+            server.monitored_on(listener)
+        }
+        None => server,
+    };
     server.serve(listeners, shutdown).await?;
     Ok(())
 }

@@ -20,8 +20,7 @@ use tokio::{
     sync::{Semaphore, watch},
 };
 use tokio_util::sync::CancellationToken;
-use tonic::{codec::CompressionEncoding::Gzip, server::NamedService, transport};
-use tonic_health::{ServingStatus, server::HealthReporter};
+use tonic::{codec::CompressionEncoding::Gzip, transport};
 use tonic_web::GrpcWebLayer;
 use tower::util::option_layer;
 
@@ -36,6 +35,7 @@ use crate::{
     limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
     listen::Listener,
     middleware::Around,
+    monitor::{Monitor, Phase, Vitals, set_health},
     net::{MAX_HEADERS, UnreadAnswers, UnreadCount, accept},
     objects::{
         derived::Resizer,
@@ -117,6 +117,9 @@ pub enum ServeError {
 pub struct Server {
     handler: Handler,
     builds: Places,
+    /// Where what is saved is kept. `None` for memory.
+    files: Option<Arc<SavedFiles>>,
+    monitor: Option<Listener>,
 }
 
 /// The server's activity, for tests and monitoring.
@@ -209,9 +212,13 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
+            rigs: Arc::new(RigStore::new(
+                config.maximum_rigs.get(),
+                files.clone().map(saved_rigs),
+            )),
             resizer: Resizer(Arc::new(Semaphore::new(config.derivations()))),
             executor,
+            metrics: Arc::default(),
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
                 Instant::now(),
@@ -231,7 +238,18 @@ impl Server {
         Ok(Self {
             handler: Handler(Arc::new(shared)),
             builds,
+            files,
+            monitor: None,
         })
+    }
+
+    /// The same, with metrics and answers to probes on a listener of their own.
+    #[must_use]
+    pub fn monitored_on(self, listener: Listener) -> Self {
+        Self {
+            monitor: Some(listener),
+            ..self
+        }
     }
 
     async fn read_saved(&self) -> Result<(), StoreError> {
@@ -286,12 +304,25 @@ impl Server {
     }
 
     async fn serve_until(
-        self,
+        mut self,
         listeners: Vec<Listener>,
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
+        let close = CancellationToken::new();
+        let _close_at_the_end = close.clone().drop_guard();
+        let vitals = Arc::new(Vitals::default());
+        let monitor = Monitor::new(self.handler.clone(), self.builds.clone(), Arc::clone(&vitals));
+        let until_closed = |task| tokio::spawn(close.clone().run_until_cancelled_owned(task));
+        if let Some(listener) = self.monitor.take() {
+            until_closed(Box::pin(monitor.serve(listener)) as BoxFuture<'static, ()>);
+        }
         self.read_saved().await?;
-        let Self { handler, builds } = self;
+        let Self {
+            handler,
+            builds,
+            files,
+            ..
+        } = self;
         let config = &handler.config;
         let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
         let grasps = GraspServiceServer::new(handler.clone())
@@ -313,10 +344,13 @@ impl Server {
             large: rigs.max_decoding_message_size(largest_upload),
         };
         let (health, health_service) = tonic_health::server::health_reporter();
-        set_health(&health, ServingStatus::Serving).await;
+        set_health(&health, true, true).await;
+        let watch = Arc::clone(&vitals).watch(handler.executor.clone(), files, health.clone());
+        until_closed(Box::pin(watch));
+        vitals.enter(Phase::Serving);
 
         let stop = handler.shutdown.clone();
-        let close = CancellationToken::new();
+        let drained = CancellationToken::new();
         let incoming = accept(
             listeners,
             config.maximum_connections.get(),
@@ -346,12 +380,15 @@ impl Server {
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
             .layer(Around(Calls {
+                metrics: Arc::clone(&handler.metrics),
                 in_flight: handler.calls.clone(),
                 uploads: builds,
                 upload_grace: 2 * config.streams.upload_idle,
                 packers: Arc::clone(&packers),
                 largest_upload,
                 reserve: Arc::clone(&handler.reserve),
+                shutdown: stop.clone(),
+                drained: drained.clone(),
                 longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
             }))
             .layer(Around(Transcoding {
@@ -368,19 +405,21 @@ impl Server {
 
         // Stops all tasks, however this function ends.
         let _builders_end = handler.atlases.stopper();
-        let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
         let shutting_down = async {
             shutdown.await;
             tracing::info!(calls = handler.calls.receiver_count(), "draining");
             drop(handler.atlases.stopper());
-            set_health(&health, ServingStatus::NotServing).await;
+            vitals.enter(Phase::Draining);
+            set_health(&health, false, false).await;
+            tokio::time::sleep(config.drain_delay).await;
             stop.cancel();
-            let drained = tokio::time::timeout(config.drain, handler.calls.closed()).await;
-            if drained.is_err() {
+            let ended = tokio::time::timeout(config.drain, handler.calls.closed()).await;
+            if ended.is_err() {
                 let calls = handler.calls.receiver_count();
                 tracing::warn!(calls, "the drain time has passed; cutting off running calls");
             }
+            drained.cancel();
             tokio::time::sleep(LINGER).await;
             // The transport would wait for idle connections and open streams forever.
             close.cancel();
@@ -426,15 +465,4 @@ fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
-}
-
-async fn set_health(health: &HealthReporter, status: ServingStatus) {
-    for service in [
-        "",
-        GraspServiceServer::<Handler>::NAME,
-        ObjectServiceServer::<Handler>::NAME,
-        HandRigServiceServer::<Handler>::NAME,
-    ] {
-        health.set_service_status(service, status).await;
-    }
 }

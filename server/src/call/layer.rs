@@ -8,19 +8,22 @@ use std::{
 
 use http::{Request, Response};
 use tokio::sync::{Semaphore, watch};
+use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, body::Body, server::NamedService};
 use tower::Service;
 
 use super::{
-    CallContext, OpenCall,
+    CallContext, LOGGED_PACKAGE, OpenCall,
+    ending::ended_by,
     packing::{accepts_gzip, packing},
     upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
 use crate::{
-    budget::{DeadlineReserve, parse_grpc_timeout},
+    budget::DeadlineReserve,
     client::Client,
     error::{ServiceError, blame_client},
     limits::{MAX_FIND_REQUEST, Places},
+    metrics::Metrics,
     middleware::{Answer, Middleware},
     net::{Reader, arriving},
 };
@@ -55,6 +58,7 @@ pub(crate) fn is_upload(path: &str) -> bool {
 /// Wraps every service; see the module documentation.
 #[derive(Clone, Debug)]
 pub(crate) struct Calls {
+    pub metrics: Arc<Metrics>,
     /// Has a receiver per call in flight.
     pub in_flight: watch::Sender<()>,
     /// One place per concurrent upload.
@@ -69,6 +73,10 @@ pub(crate) struct Calls {
     pub largest_upload: usize,
     /// Longest time from a call's headers to those of its answer.
     pub longest_call: Duration,
+    /// Cancelled when the server begins to shut down.
+    pub shutdown: CancellationToken,
+    /// Cancelled when running calls have had their time to end.
+    pub drained: CancellationToken,
 }
 
 impl Calls {
@@ -91,16 +99,11 @@ impl Middleware<Body> for Calls {
         E: Send + 'static,
         F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
     {
-        let timeout = request
-            .headers()
-            .get("grpc-timeout")
-            .and_then(|header| header.to_str().ok())
-            .and_then(parse_grpc_timeout);
         let reader = request.extensions().get::<Arc<Reader>>().cloned();
         let client = reader
             .as_ref()
             .map_or(Client::Local, |reader| reader.client.clone());
-        let context = CallContext::arriving(timeout, client);
+        let context = CallContext::arriving(request.headers(), client, &self.metrics);
         let path = request.uri().path();
         let mut call = OpenCall::new(path, context.clone(), &self.in_flight, &self.reserve);
         let place = match reader.as_ref().map(|reader| reader.begin_call()).transpose() {
@@ -114,6 +117,7 @@ impl Middleware<Body> for Calls {
             Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),
             None => (MAX_FIND_REQUEST, usize::MAX),
         };
+        let ends = (!path.starts_with(LOGGED_PACKAGE)).then(|| self.shutdown.clone());
         let packs = !AWAITED_STREAMS.contains(&path) && accepts_gzip(request.headers());
         request.extensions_mut().insert(context);
         let (mut request, arriving) = arriving(request, most_counted);
@@ -124,6 +128,7 @@ impl Middleware<Body> for Calls {
         }
         let answer = next(request);
         let packers = Arc::clone(&self.packers);
+        let drained = self.drained.clone();
         let answer = async move {
             let answer = answer.await?;
             drop(place);
@@ -134,16 +139,31 @@ impl Middleware<Body> for Calls {
             })
         };
         Box::pin(async move {
-            let answer = match end {
-                None => answer.await,
-                Some((at, error)) => tokio::time::timeout_at(at.into(), answer)
-                    .await
-                    .unwrap_or_else(|_| Ok(refusal(error))),
+            let due = async {
+                match end {
+                    None => std::future::pending().await,
+                    Some((at, error)) => {
+                        tokio::time::sleep_until(at.into()).await;
+                        error
+                    }
+                }
+            };
+            let answer = tokio::select! {
+                biased;
+                answer = answer => answer,
+                error = due => Ok(refusal(error)),
+                () = drained.cancelled() => Ok(refusal(ServiceError::ShuttingDown)),
             };
             drop(arriving);
             call.answered();
             match answer {
-                Ok(answer) => Ok(call.answer(blame_client(answer, largest))),
+                Ok(answer) => {
+                    let answer = blame_client(answer, largest);
+                    Ok(call.answer(match ends {
+                        Some(shutdown) => answer.map(|body| ended_by(body, shutdown)),
+                        None => answer,
+                    }))
+                }
                 Err(error) => {
                     call.fail(Code::Internal);
                     Err(error)

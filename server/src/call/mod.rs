@@ -3,28 +3,36 @@
 //! uploads; no other call of the same service may send large messages. A call lasts until its answer's body has been handed to the
 //! transport, which for streams may be long after its headers.
 
+mod ending;
 mod layer;
 mod packing;
+mod request_id;
 mod upload;
 
 use std::{
+    borrow::Cow,
     sync::{Arc, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
 
-use http::{HeaderMap, Response};
+use grasp_proto::v1;
+use http::{HeaderMap, HeaderValue, Response};
 use tokio::sync::watch;
 use tonic::{Code, body::Body};
 
+use self::request_id::request_id;
 pub(crate) use self::{
     layer::{BySize, Calls, is_upload},
     packing::Messages as FramedMessages,
+    request_id::REQUEST_ID,
     upload::UploadPermit,
 };
 use crate::{
-    budget::DeadlineReserve,
+    budget::{DeadlineReserve, parse_grpc_timeout},
     client::Client,
+    error::add_request_id,
+    metrics::{Method, Metrics},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
@@ -34,10 +42,13 @@ const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
 /// Context of a call for its handler, which adds to the call's log line.
 #[derive(Clone, Debug)]
 pub(crate) struct CallContext {
+    /// The client's id of the request, or a new one.
+    request_id: HeaderValue,
     pub arrived: Instant,
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
     pub client: Client,
+    metrics: Arc<Metrics>,
     record: Arc<CallRecord>,
 }
 
@@ -47,6 +58,8 @@ struct CallRecord {
     object: OnceLock<String>,
     reserve: OnceLock<Duration>,
     search: OnceLock<SearchSummary>,
+    /// When the search was ready for its workers.
+    ready: OnceLock<Instant>,
     /// When the search has to end.
     due: OnceLock<Instant>,
     /// When it ended.
@@ -60,6 +73,8 @@ pub(crate) struct SearchSummary {
     pub outcome: &'static str,
     pub attempts: u64,
     pub time: Duration,
+    /// The check for which there is no grasp, or not the current one.
+    pub failed_check: Option<v1::Check>,
 }
 
 impl CallContext {
@@ -72,22 +87,32 @@ impl CallContext {
     /// The context of a part of the call that arrived at `arrived` and is answered like a call of its own.
     pub(crate) fn of_part(&self, arrived: Instant) -> Self {
         Self {
+            request_id: self.request_id.clone(),
             arrived,
             deadline: self.deadline,
             client: self.client.clone(),
+            metrics: Arc::clone(&self.metrics),
             record: Arc::default(),
         }
     }
 
-    fn arriving(timeout: Option<Duration>, client: Client) -> Self {
+    fn arriving(headers: &HeaderMap, client: Client, metrics: &Arc<Metrics>) -> Self {
         let arrived = Instant::now();
+        let timeout = headers.get("grpc-timeout");
+        let timeout = timeout.and_then(|timeout| parse_grpc_timeout(timeout.to_str().ok()?));
         Self {
+            request_id: request_id(headers),
             arrived,
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
             client,
+            metrics: Arc::clone(metrics),
             record: Arc::default(),
         }
+    }
+
+    pub(crate) fn request_id(&self) -> &str {
+        self.request_id.to_str().unwrap_or_default()
     }
 
     /// When a call that is no search has to be answered, if it has a deadline.
@@ -99,10 +124,22 @@ impl CallContext {
     /// Records when the search that starts now has to end. A past time counts as now: earlier waiting, such as for the rest of a
     /// request, is no delay of the answer.
     pub(crate) fn search_is_due(&self, due: Instant) {
-        let _ = self.record.due.set(due.max(Instant::now()));
+        let now = Instant::now();
+        let _ = self.record.ready.set(now);
+        let _ = self.record.due.set(due.max(now));
     }
 
     pub(crate) fn search_ended(&self, at: Instant, summary: SearchSummary) {
+        let SearchSummary {
+            outcome,
+            time,
+            failed_check,
+            ..
+        } = summary;
+        let began = at.checked_sub(time).unwrap_or(at);
+        let ready = self.record.ready.get().copied().unwrap_or(began);
+        let queued = began.saturating_duration_since(ready);
+        self.metrics.searched(queued, time, outcome, failed_check);
         let _ = self.record.ended.set(at);
         let _ = self.record.search.set(summary);
     }
@@ -140,7 +177,8 @@ fn code_in(headers: &HeaderMap) -> Option<Code> {
 /// client does not read. A client drops the call at its deadline: the answer would have taken at least until then.
 #[derive(Debug)]
 struct OpenCall {
-    method: String,
+    method: Method,
+    path: Cow<'static, str>,
     context: CallContext,
     /// `None` is logged as cancelled.
     code: Option<Code>,
@@ -169,8 +207,14 @@ impl OpenCall {
         in_flight: &watch::Sender<()>,
         reserve: &Arc<DeadlineReserve>,
     ) -> Self {
+        let method = context.metrics.call_started(path);
+        let clipped = || path.chars().take(MAX_LOGGED_METHOD).collect();
         Self {
-            method: path.chars().take(MAX_LOGGED_METHOD).collect(),
+            method,
+            path: context
+                .metrics
+                .path(method)
+                .map_or_else(|| Cow::Owned(clipped()), Cow::Borrowed),
             context,
             code: None,
             reserve: Arc::clone(reserve),
@@ -185,9 +229,23 @@ impl OpenCall {
     }
 
     /// The answer, with whose body the call ends.
-    fn answer(mut self, answer: Response<Body>) -> Response<Body> {
-        self.code = code_in(answer.headers()).or(self.code);
+    fn answer(mut self, mut answer: Response<Body>) -> Response<Body> {
+        self.read_status(answer.headers_mut());
+        answer
+            .headers_mut()
+            .insert(REQUEST_ID, self.context.request_id.clone());
         answer.map(|inner| filtered(inner, self))
+    }
+
+    /// Reads the status in headers or trailers, and adds the id of the request to an error.
+    fn read_status(&mut self, headers: &mut HeaderMap) {
+        let Some(code) = code_in(headers) else { return };
+        self.code = Some(code);
+        if code != Code::Ok
+            && let Some(reason) = add_request_id(headers, self.context.request_id())
+        {
+            self.context.metrics.refused(reason);
+        }
     }
 
     /// The transport requests the next part of the answer.
@@ -219,12 +277,22 @@ impl Drop for OpenCall {
         self.answered();
         let record = &self.context.record;
         let search = record.search.get();
-        let status = grpc_name(self.code.unwrap_or(Code::Cancelled));
-        let total_us = micros(self.context.arrived.elapsed());
+        let code = self.code.unwrap_or(Code::Cancelled);
+        let total = self.context.arrived.elapsed();
+        let metrics = &self.context.metrics;
+        metrics.call_ended(self.method, code, total);
+        let late = self.context.deadline.map(|deadline| deadline.elapsed());
+        // A client that gave up earlier says nothing about answers.
+        if let Some(late) = late.filter(|late| self.code.is_some() || !late.is_zero()) {
+            metrics.overshot(late);
+        }
+        let (status, total_us) = (grpc_name(code), micros(total));
         macro_rules! log {
             ($level:ident) => {
                 tracing::$level!(
-                    method = %self.method,
+                    method = %self.path,
+                    client = %self.context.client,
+                    request_id = self.context.request_id(),
                     object = record.object.get(),
                     outcome = search.map(|s| s.outcome),
                     attempts = search.map(|s| s.attempts),
@@ -236,7 +304,7 @@ impl Drop for OpenCall {
                 )
             };
         }
-        if self.method.starts_with(LOGGED_PACKAGE) {
+        if self.path.starts_with(LOGGED_PACKAGE) {
             log!(info);
         } else {
             log!(debug);
@@ -264,14 +332,14 @@ fn grpc_name(code: Code) -> String {
 impl FrameFilter for OpenCall {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         self.asked();
-        let polled = next_frame(inner, cx);
+        let mut polled = next_frame(inner, cx);
         if polled.is_ready() {
             self.answered();
         }
-        if let Poll::Ready(Some(Ok(frame))) = &polled
-            && let Some(code) = frame.trailers_ref().and_then(code_in)
+        if let Poll::Ready(Some(Ok(frame))) = &mut polled
+            && let Some(trailers) = frame.trailers_mut()
         {
-            self.code = Some(code);
+            self.read_status(trailers);
         }
         polled
     }

@@ -86,6 +86,10 @@ pub struct Config {
     pub web_origins: WebOrigins,
     /// Serve the page that shows grasps in a browser at `/`.
     pub viewer: bool,
+    /// Address for metrics and probes. `None` for nowhere. The binary listens there; see [`crate::Server::monitored_on`].
+    pub metrics_listen: Option<ListenAddress>,
+    /// How long new calls are answered after the signal to end, for balancers to notice.
+    pub drain_delay: Duration,
     /// How long to wait for running calls at shutdown.
     pub drain: Duration,
     /// Rig of the receiving hand if a request names none. Under `THESIS` validity it is always the rig `thesis`.
@@ -138,6 +142,8 @@ impl Default for Config {
             maximum_unread_bytes: non_zero(32 << 20),
             web_origins: WebOrigins::LOOPBACK,
             viewer: false,
+            metrics_listen: None,
+            drain_delay: Duration::ZERO,
             drain: Duration::from_secs(10),
             default_rig: "adult".to_owned(),
             log_format: LogFormat::Text,

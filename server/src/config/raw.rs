@@ -146,6 +146,14 @@ pub struct RawConfig {
     /// Serve a page at `/` that shows objects, hands and grasps in a browser [default: false].
     #[arg(long, env = "GRASP_VIEWER", value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub viewer: Option<bool>,
+    /// Address for metrics (`/metrics`) and probes (`/livez`, `/readyz`), such as `127.0.0.1:9464` or `unix:/PATH` [default: none].
+    #[arg(long, env = "GRASP_METRICS_LISTEN", value_name = "ADDRESS")]
+    pub metrics_listen: Option<String>,
+    /// How long new calls are answered after a signal to end, in milliseconds, while health is already `NOT_SERVING` [default: 0].
+    ///
+    /// Give it the time that load balancers take to notice.
+    #[arg(long, env = "GRASP_DRAIN_DELAY_MS", value_name = "MS")]
+    pub drain_delay_ms: Option<u64>,
     /// How long to wait for running calls at shutdown, in milliseconds [default: 10000].
     #[arg(long, env = "GRASP_DRAIN_MS", value_name = "MS")]
     pub drain_ms: Option<u64>,
@@ -254,6 +262,8 @@ impl RawConfig {
         read!(text(web_origins => config.web_origins, NEEDED_ORIGINS, parse_origins));
         config.viewer = self.viewer.or(fallback.viewer).unwrap_or(config.viewer);
         self.viewer = Some(config.viewer);
+        read!(address(metrics_listen => config.metrics_listen,));
+        read!(time(drain_delay_ms => config.drain_delay, 0..=600_000));
         read!(time(drain_ms => config.drain, 0..=600_000));
         let rig = |name: &str| RIG_NAMES.contains(&name).then(|| name.to_owned());
         read!(text(default_rig => config.default_rig, &RIG_NAMES.join(" or "), rig));
@@ -313,6 +323,16 @@ impl Check {
             self.reject(key, "\"\"", "a folder, or absent");
         }
         value.clone_from(raw);
+    }
+
+    /// One address, or absent.
+    fn address(&mut self, key: &str, raw: &mut Option<String>, value: &mut Option<ListenAddress>) {
+        if let Some(text) = raw {
+            match text.trim().parse() {
+                Ok(address) => *value = Some(address),
+                Err(_) => self.reject(key, format_args!("{text:?}"), NEEDED_LISTEN),
+            }
+        }
     }
 
     fn addresses(&mut self, key: &str, raw: &mut Option<Vec<String>>, value: &mut Vec<ListenAddress>) {
@@ -390,15 +410,15 @@ mod tests {
         assert_eq!(read, raw);
         assert_eq!(read.complete(RawConfig::default()).unwrap(), config);
         // Every value is printed but that of an absent folder.
-        assert_eq!(text.lines().count(), 32, "{text}");
+        assert_eq!(text.lines().count(), 33, "{text}");
         let error = toml::from_str::<RawConfig>("wokers = 3").unwrap_err();
         assert!(error.to_string().contains("wokers"), "{error}");
     }
 
     #[test]
     fn reports_every_invalid_value_with_its_key() {
-        // Five numbers may be 0.
-        for (number, expected) in [(0, 27), (i64::MAX, 32)] {
+        // Six numbers may be 0.
+        for (number, expected) in [(0, 28), (i64::MAX, 34)] {
             let mut raw = RawConfig::default();
             raw.complete(RawConfig::default()).unwrap();
             let mut keys = toml::Table::try_from(&raw).unwrap();
@@ -413,6 +433,7 @@ mod tests {
             }
             keys.insert("objects_directory".to_owned(), "".into());
             keys.insert("atlas_directory".to_owned(), "".into());
+            keys.insert("metrics_listen".to_owned(), "9464".into());
             let mut raw: RawConfig = keys.try_into().unwrap();
             let Err(ConfigError::BadValues(bad)) = raw.complete(RawConfig::default()) else {
                 panic!("most of it is wrong");

@@ -341,10 +341,8 @@ fn written(call: &Call, messages: Bytes) -> Result<Bytes, ServiceError> {
 mod tests {
     use http_body_util::{BodyExt as _, StreamBody};
 
-    use super::{
-        super::{Format, methods::method},
-        *,
-    };
+    use super::{super::Format, *};
+    use crate::methods::method;
 
     #[tokio::test]
     async fn envelopes_are_read_in_pieces_of_any_size() {

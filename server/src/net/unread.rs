@@ -21,6 +21,8 @@ use crate::{
     client::Client,
     error::{Limit, ServiceError},
     limits::{MAX_RESPONSE, locked},
+    metrics::Counters,
+    warning_rate::WarningRate,
 };
 
 /// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size.
@@ -48,7 +50,14 @@ pub(crate) struct UnreadAnswers {
     /// The zero of [`Reader::progress`].
     start: Instant,
     readers: Mutex<Vec<Weak<Reader>>>,
+    /// Closed connections.
+    pub(crate) closings: Counters,
+    warnings: WarningRate,
 }
+
+/// Why connections are closed, as in metrics.
+const TOO_MANY_BYTES: &str = "too_many_bytes";
+const STALLED: &str = "stalled";
 
 /// Bytes and calls that wait on one connection.
 #[derive(Debug)]
@@ -103,11 +112,19 @@ impl UnreadAnswers {
             total: AtomicUsize::new(0),
             start: Instant::now(),
             readers: Mutex::default(),
+            closings: Counters::new("reason", [TOO_MANY_BYTES, STALLED]),
+            warnings: WarningRate::default(),
         })
     }
 
     pub(crate) fn bytes(&self) -> usize {
         self.total.load(Ordering::Relaxed)
+    }
+
+    /// Number of open connections.
+    pub(crate) fn connections(&self) -> usize {
+        let readers = locked(&self.readers);
+        readers.iter().filter(|reader| reader.strong_count() > 0).count()
     }
 
     pub(crate) fn connect(self: &Arc<Self>, client: Client) -> Arc<Reader> {
@@ -144,7 +161,7 @@ impl UnreadAnswers {
         for reader in self.open() {
             let since = now.saturating_sub(reader.progress.load(Ordering::Relaxed));
             if reader.unread() > 0 && Duration::from_millis(since) > longest {
-                reader.close("it has taken nothing for too long");
+                reader.close(STALLED);
             }
         }
     }
@@ -167,7 +184,7 @@ impl UnreadAnswers {
             && let Some((_, bytes, largest)) = open.pop()
         {
             sum -= bytes;
-            largest.close("it holds the most of too many bytes");
+            largest.close(TOO_MANY_BYTES);
         }
     }
 
@@ -227,12 +244,17 @@ impl Reader {
         locked(&self.waiting).bytes
     }
 
-    fn close(&self, reason: &str) {
-        tracing::warn!(
-            unread_bytes = self.unread(),
-            reason,
-            "closing a connection whose client does not read, or does not end its requests"
-        );
+    fn close(&self, reason: &'static str) {
+        self.all.closings.add_value(reason);
+        if let Some(unlogged) = self.all.warnings.pass() {
+            tracing::warn!(
+                client = %self.client,
+                unread_bytes = self.unread(),
+                reason,
+                unlogged,
+                "closing a connection whose client does not read, or does not end its requests"
+            );
+        }
         self.cut_off.cancel();
     }
 

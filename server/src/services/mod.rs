@@ -31,6 +31,7 @@ use crate::{
     error::ServiceError,
     executor::{SearchExecutor, before, run_blocking, run_stoppable},
     limits::Places,
+    metrics::Metrics,
     net::UnreadAnswers,
     objects::{
         Derived, Revision, StoredObject,
@@ -53,6 +54,7 @@ pub(crate) struct Shared {
     pub rigs: Arc<RigStore>,
     pub atlases: Atlases,
     pub executor: SearchExecutor,
+    pub metrics: Arc<Metrics>,
     pub resizer: Resizer,
     /// The part of deadlines kept for answers.
     pub reserve: Arc<DeadlineReserve>,

@@ -11,8 +11,17 @@ use std::{
 
 /// The server's top-level modules, as documented in its `lib.rs`.
 const SERVER: &[&[&str]] = &[
-    &["budget", "client", "convention", "error", "middleware", "wire"],
-    &["limits", "listen", "viewer"],
+    &[
+        "budget",
+        "client",
+        "convention",
+        "error",
+        "methods",
+        "middleware",
+        "warning_rate",
+        "wire",
+    ],
+    &["limits", "listen", "metrics", "viewer"],
     &["atlas_slots", "health_check", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],
@@ -20,6 +29,7 @@ const SERVER: &[&[&str]] = &[
     &["atlases"],
     &["search"],
     &["services"],
+    &["monitor"],
     &["serve"],
 ];
 

@@ -21,6 +21,7 @@ const SUMMARY: SearchSummary = SearchSummary {
     outcome: "FOUND",
     attempts: 1,
     time: Duration::ZERO,
+    failed_check: None,
 };
 
 /// A call as its service sees it.
@@ -67,6 +68,7 @@ impl Call {
 
 fn admitting_one() -> Calls {
     Calls {
+        metrics: Arc::default(),
         in_flight: watch::Sender::new(()),
         uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),
@@ -74,6 +76,8 @@ fn admitting_one() -> Calls {
         largest_upload: 1 << 20,
         longest_call: Duration::from_mins(1),
         packers: Arc::new(Semaphore::new(1)),
+        shutdown: CancellationToken::new(),
+        drained: CancellationToken::new(),
     }
 }
 
