@@ -16,8 +16,8 @@
 //! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
 //! contents.
 //!
-//! `metrics` counts calls and searches, by the `methods` of the services, and `monitor` answers operators and probes on a port of its
-//! own. `warning_rate` bounds warnings that clients can cause.
+//! `metrics` counts calls and searches, by the `methods` of the services, `traces` are their spans, and `monitor` answers operators and probes on a port of its
+//! own. `warning_rate` bounds warnings that clients can cause, and `log_lines` escapes what they send.
 //!
 //! Before serving, `memory` compares the configured limits with those of the process, and `objects::directory` loads the folder
 //! of objects. Between calls, `atlases` builds atlases in the background.
@@ -29,7 +29,7 @@
 //!
 //! ```text
 //! budget  client  convention  error  methods  middleware  warning_rate  wire
-//! limits  listen  metrics  viewer
+//! limits  listen  log_lines  metrics  traces  viewer
 //! atlas_slots  health_check  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
@@ -59,6 +59,7 @@ mod executor;
 mod health_check;
 mod limits;
 mod listen;
+mod log_lines;
 mod memory;
 mod methods;
 mod metrics;
@@ -71,6 +72,7 @@ mod saved;
 mod search;
 mod serve;
 mod services;
+mod traces;
 mod track;
 mod validate;
 mod viewer;
@@ -83,6 +85,7 @@ pub use config::{Config, ConfigError};
 pub use health_check::check_health;
 pub use limits::{StoreLimits, StreamLimits};
 pub use listen::{ListenAddress, Listener};
+pub use log_lines::LogLines;
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use saved::StoreError;

@@ -12,7 +12,7 @@ use std::{
 use clap::{CommandFactory as _, Parser};
 use futures_util::future::select_all;
 use grasp_server::{
-    Config, ListenAddress, Listener, Server, check_health,
+    Config, ListenAddress, Listener, LogLines, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
     is_reserved_memory_limited, warn_of_memory,
 };
@@ -29,7 +29,7 @@ const RUNTIME_END: Duration = Duration::from_millis(500);
 ///
 /// The server refuses to start, prints the reason and exits with 1 if a value or an object of the objects directory is
 /// invalid. After SIGTERM, SIGINT, SIGQUIT or SIGHUP, which a terminal sends when it is closed, it
-/// answers running calls and exits with 0.
+/// answers running calls and exits with 0; a second signal ends it at once, with 1.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
 struct Flags {
@@ -159,6 +159,11 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
     let mut signals = kinds.into_iter().map(signal).collect::<io::Result<Vec<_>>>()?;
     let shutdown = async move {
         select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
+        tokio::spawn(async move {
+            select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
+            tracing::warn!("a second signal: ending at once");
+            std::process::exit(1);
+        });
     };
     for listener in &listeners {
         let address = listener.address()?;
@@ -185,11 +190,12 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
 
 fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
     let filtered = tracing_subscriber::registry().with(config.log.parse::<Targets>()?);
+    let is_terminal = io::stderr().is_terminal();
     let log = fmt::layer()
-        .with_ansi(io::stderr().is_terminal())
+        .with_ansi(is_terminal)
         // Writing to a log that failed, such as a closed terminal, would panic.
         .log_internal_errors(false)
-        .with_writer(io::stderr);
+        .with_writer(move || LogLines::new(io::stderr(), is_terminal));
     match config.log_format {
         LogFormat::Text => filtered.with(log).init(),
         LogFormat::Json => filtered.with(log.json().flatten_event(true)).init(),

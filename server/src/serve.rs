@@ -46,6 +46,7 @@ use crate::{
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
+    traces::Traces,
     track::OpenTracks,
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
@@ -107,6 +108,9 @@ pub enum ServeError {
     /// The descriptors of the contract are broken.
     #[error("cannot offer reflection: {0}")]
     Reflection(#[from] tonic_reflection::server::Error),
+    /// Traces cannot be sent.
+    #[error("{0}")]
+    Traces(String),
     /// The transport failed.
     #[error("the transport failed: {0}")]
     Transport(#[from] transport::Error),
@@ -316,6 +320,8 @@ impl Server {
         if let Some(listener) = self.monitor.take() {
             until_closed(Box::pin(monitor.serve(listener)) as BoxFuture<'static, ()>);
         }
+        let traces =
+            Traces::start(self.handler.config.otlp_endpoint.as_deref()).map_err(ServeError::Traces)?;
         self.read_saved().await?;
         let Self {
             handler,
@@ -381,6 +387,7 @@ impl Server {
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
             .layer(Around(Calls {
                 metrics: Arc::clone(&handler.metrics),
+                traces: traces.clone(),
                 in_flight: handler.calls.clone(),
                 uploads: builds,
                 upload_grace: 2 * config.streams.upload_idle,
@@ -430,6 +437,8 @@ impl Server {
             () = handler.unread.close_stalled() => {}
             () = shutting_down => {}
         }
+        // The last calls end with their connections.
+        let _ = tokio::task::spawn_blocking(move || traces.finish()).await;
         tracing::info!("stopped");
         Ok(())
     }

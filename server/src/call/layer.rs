@@ -26,6 +26,7 @@ use crate::{
     metrics::Metrics,
     middleware::{Answer, Middleware},
     net::{Reader, arriving},
+    traces::Traces,
 };
 
 /// Methods that build objects or rigs from large messages. The number of such messages received at a time is bounded.
@@ -59,6 +60,7 @@ pub(crate) fn is_upload(path: &str) -> bool {
 #[derive(Clone, Debug)]
 pub(crate) struct Calls {
     pub metrics: Arc<Metrics>,
+    pub traces: Traces,
     /// Has a receiver per call in flight.
     pub in_flight: watch::Sender<()>,
     /// One place per concurrent upload.
@@ -105,7 +107,13 @@ impl Middleware<Body> for Calls {
             .map_or(Client::Local, |reader| reader.client.clone());
         let context = CallContext::arriving(request.headers(), client, &self.metrics);
         let path = request.uri().path();
-        let mut call = OpenCall::new(path, context.clone(), &self.in_flight, &self.reserve);
+        let mut call = OpenCall::new(
+            path,
+            context.clone(),
+            &self.in_flight,
+            &self.reserve,
+            &self.traces,
+        );
         let place = match reader.as_ref().map(|reader| reader.begin_call()).transpose() {
             Ok(place) => place,
             Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),

@@ -34,6 +34,7 @@ use crate::{
     error::add_request_id,
     metrics::{Method, Metrics},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+    traces::{CallTrace, Interval, Traces},
 };
 
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.
@@ -49,6 +50,8 @@ pub(crate) struct CallContext {
     pub deadline: Option<Instant>,
     pub client: Client,
     metrics: Arc<Metrics>,
+    /// The header with the span of the caller.
+    traceparent: Option<HeaderValue>,
     record: Arc<CallRecord>,
 }
 
@@ -58,6 +61,8 @@ struct CallRecord {
     object: OnceLock<String>,
     reserve: OnceLock<Duration>,
     search: OnceLock<SearchSummary>,
+    /// When the object was prepared for searches, if it was not.
+    preparation: OnceLock<Interval>,
     /// When the search was ready for its workers.
     ready: OnceLock<Instant>,
     /// When the search has to end.
@@ -92,6 +97,7 @@ impl CallContext {
             deadline: self.deadline,
             client: self.client.clone(),
             metrics: Arc::clone(&self.metrics),
+            traceparent: None,
             record: Arc::default(),
         }
     }
@@ -107,6 +113,7 @@ impl CallContext {
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
             client,
             metrics: Arc::clone(metrics),
+            traceparent: headers.get("traceparent").cloned(),
             record: Arc::default(),
         }
     }
@@ -142,6 +149,11 @@ impl CallContext {
         self.metrics.searched(queued, time, outcome, failed_check);
         let _ = self.record.ended.set(at);
         let _ = self.record.search.set(summary);
+    }
+
+    /// Records that the object was prepared for searches since then.
+    pub(crate) fn prepared_since(&self, start: Instant) {
+        let _ = self.record.preparation.set((start, Instant::now()));
     }
 
     pub(crate) fn log_object(&self, id: &str) {
@@ -183,6 +195,7 @@ struct OpenCall {
     /// `None` is logged as cancelled.
     code: Option<Code>,
     reserve: Arc<DeadlineReserve>,
+    traces: Traces,
     transport: Transport,
     /// How long the transport has waited for parts of the answer since the end of the search.
     waited: Duration,
@@ -206,6 +219,7 @@ impl OpenCall {
         context: CallContext,
         in_flight: &watch::Sender<()>,
         reserve: &Arc<DeadlineReserve>,
+        traces: &Traces,
     ) -> Self {
         let method = context.metrics.call_started(path);
         let clipped = || path.chars().take(MAX_LOGGED_METHOD).collect();
@@ -218,6 +232,7 @@ impl OpenCall {
             context,
             code: None,
             reserve: Arc::clone(reserve),
+            traces: traces.clone(),
             transport: Transport::Waits,
             waited: Duration::ZERO,
             _in_flight: in_flight.subscribe(),
@@ -246,6 +261,41 @@ impl OpenCall {
         {
             self.context.metrics.refused(reason);
         }
+    }
+
+    fn trace(&self, code: Code) {
+        let CallContext { arrived, record, .. } = &self.context;
+        let search = record.search.get();
+        let ended = record.ended.get().copied();
+        let began = ended
+            .zip(search)
+            .and_then(|(ended, search)| ended.checked_sub(search.time));
+        let parts = [
+            ("preparation", record.preparation.get().copied()),
+            (
+                "queue",
+                record
+                    .ready
+                    .get()
+                    .copied()
+                    .zip(began)
+                    .map(|(ready, began)| (ready.min(began), began)),
+            ),
+            ("search", began.zip(ended)),
+        ];
+        self.traces.record(&CallTrace {
+            method: self.path.trim_start_matches('/'),
+            request_id: self.context.request_id(),
+            traceparent: self.context.traceparent.as_ref(),
+            object: record.object.get().map(String::as_str),
+            outcome: search.map(|search| search.outcome),
+            code,
+            time: (*arrived, Instant::now()),
+            parts: parts
+                .into_iter()
+                .filter_map(|(name, time)| Some((name, time?)))
+                .collect(),
+        });
     }
 
     /// The transport requests the next part of the answer.
@@ -285,6 +335,9 @@ impl Drop for OpenCall {
         // A client that gave up earlier says nothing about answers.
         if let Some(late) = late.filter(|late| self.code.is_some() || !late.is_zero()) {
             metrics.overshot(late);
+        }
+        if self.traces.are_on() {
+            self.trace(code);
         }
         let (status, total_us) = (grpc_name(code), micros(total));
         macro_rules! log {

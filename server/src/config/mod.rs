@@ -88,6 +88,8 @@ pub struct Config {
     pub viewer: bool,
     /// Address for metrics and probes. `None` for nowhere. The binary listens there; see [`crate::Server::monitored_on`].
     pub metrics_listen: Option<ListenAddress>,
+    /// Address of a collector of OpenTelemetry for traces, `http://HOST:PORT`. `None` for no traces.
+    pub otlp_endpoint: Option<String>,
     /// How long new calls are answered after the signal to end, for balancers to notice.
     pub drain_delay: Duration,
     /// How long to wait for running calls at shutdown.
@@ -143,6 +145,7 @@ impl Default for Config {
             web_origins: WebOrigins::LOOPBACK,
             viewer: false,
             metrics_listen: None,
+            otlp_endpoint: None,
             drain_delay: Duration::ZERO,
             drain: Duration::from_secs(10),
             default_rig: "adult".to_owned(),

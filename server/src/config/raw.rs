@@ -19,6 +19,7 @@ use crate::{
     limits::MAX_RESPONSE,
     listen::{ListenAddress, NEEDED_LISTEN},
     saved::NEEDED_PLACE,
+    traces::{NEEDED_ENDPOINT, parse_endpoint},
     web::{NEEDED_ORIGINS, parse_origins},
 };
 
@@ -149,6 +150,12 @@ pub struct RawConfig {
     /// Address for metrics (`/metrics`) and probes (`/livez`, `/readyz`), such as `127.0.0.1:9464` or `unix:/PATH` [default: none].
     #[arg(long, env = "GRASP_METRICS_LISTEN", value_name = "ADDRESS")]
     pub metrics_listen: Option<String>,
+    /// Where to send traces of calls: a collector of OpenTelemetry that takes OTLP over gRPC, such as `http://localhost:4317` [default:
+    /// none].
+    ///
+    /// Needs a server built with the feature otlp, as the one in the container image is.
+    #[arg(long, env = "GRASP_OTLP_ENDPOINT", value_name = "ADDRESS")]
+    pub otlp_endpoint: Option<String>,
     /// How long new calls are answered after a signal to end, in milliseconds, while health is already `NOT_SERVING` [default: 0].
     ///
     /// Give it the time that load balancers take to notice.
@@ -262,7 +269,9 @@ impl RawConfig {
         read!(text(web_origins => config.web_origins, NEEDED_ORIGINS, parse_origins));
         config.viewer = self.viewer.or(fallback.viewer).unwrap_or(config.viewer);
         self.viewer = Some(config.viewer);
-        read!(address(metrics_listen => config.metrics_listen,));
+        let address = |text: &str| text.trim().parse::<ListenAddress>().ok();
+        read!(optional(metrics_listen => config.metrics_listen, NEEDED_LISTEN, address));
+        read!(optional(otlp_endpoint => config.otlp_endpoint, NEEDED_ENDPOINT, parse_endpoint));
         read!(time(drain_delay_ms => config.drain_delay, 0..=600_000));
         read!(time(drain_ms => config.drain, 0..=600_000));
         let rig = |name: &str| RIG_NAMES.contains(&name).then(|| name.to_owned());
@@ -325,12 +334,19 @@ impl Check {
         value.clone_from(raw);
     }
 
-    /// One address, or absent.
-    fn address(&mut self, key: &str, raw: &mut Option<String>, value: &mut Option<ListenAddress>) {
+    /// A text that may be absent.
+    fn optional<T>(
+        &mut self,
+        key: &str,
+        raw: &mut Option<String>,
+        value: &mut Option<T>,
+        needed: &str,
+        parse: impl Fn(&str) -> Option<T>,
+    ) {
         if let Some(text) = raw {
-            match text.trim().parse() {
-                Ok(address) => *value = Some(address),
-                Err(_) => self.reject(key, format_args!("{text:?}"), NEEDED_LISTEN),
+            *value = parse(text);
+            if value.is_none() {
+                self.reject(key, format_args!("{text:?}"), needed);
             }
         }
     }
@@ -418,7 +434,7 @@ mod tests {
     #[test]
     fn reports_every_invalid_value_with_its_key() {
         // Six numbers may be 0.
-        for (number, expected) in [(0, 28), (i64::MAX, 34)] {
+        for (number, expected) in [(0, 29), (i64::MAX, 35)] {
             let mut raw = RawConfig::default();
             raw.complete(RawConfig::default()).unwrap();
             let mut keys = toml::Table::try_from(&raw).unwrap();
@@ -434,6 +450,7 @@ mod tests {
             keys.insert("objects_directory".to_owned(), "".into());
             keys.insert("atlas_directory".to_owned(), "".into());
             keys.insert("metrics_listen".to_owned(), "9464".into());
+            keys.insert("otlp_endpoint".to_owned(), "localhost:4317".into());
             let mut raw: RawConfig = keys.try_into().unwrap();
             let Err(ConfigError::BadValues(bad)) = raw.complete(RawConfig::default()) else {
                 panic!("most of it is wrong");

@@ -13,6 +13,7 @@ use std::{
         Arc,
         atomic::{AtomicU64, Ordering},
     },
+    time::Instant,
 };
 
 use tokio::sync::{Semaphore, watch};
@@ -126,6 +127,7 @@ impl Shared {
         let due = call.answer_due();
         let permit = before(due, Arc::clone(&self.deriving).acquire_owned()).await?;
         let permit = permit.map_err(|_| ServiceError::ShuttingDown)?;
+        let start = Instant::now();
         let (objects, object, rig) = (Arc::clone(&self.objects), Arc::clone(object), rig.clone());
         let derived = run_stoppable(due, move |stop| {
             let _permit = permit;
@@ -133,7 +135,9 @@ impl Shared {
             derived.prepare(&rig, stop)?;
             Ok::<_, ServiceError>(derived)
         });
-        derived.await?
+        let derived = derived.await?;
+        call.prepared_since(start);
+        derived
     }
 }
 

@@ -1,6 +1,7 @@
 //! The binary: exit codes, messages, signals, health checks, and memory limits.
 #![cfg(target_os = "linux")]
 
+mod log;
 mod stress;
 
 use std::{
@@ -60,7 +61,11 @@ impl Running {
                 read > 0,
                 "the server ended before it logged its address: {start_log}"
             );
-            if let Some((_, rest)) = start_log[start..].split_once("address=") {
+            // In JSON or as text.
+            let line = start_log[start..]
+                .replace("\"address\":\"", "address=")
+                .replace('"', " ");
+            if let Some((_, rest)) = line.split_once("address=") {
                 break rest.split_whitespace().next().expect("it follows").to_owned();
             }
         };
@@ -72,15 +77,19 @@ impl Running {
         }
     }
 
+    fn signal(&self, signal: &str) {
+        let process = self.child.id().to_string();
+        let sent = Command::new("kill").args(["-s", signal, &process]).status();
+        assert!(sent.expect("there is kill").success());
+    }
+
     fn terminate(self) -> Vec<String> {
         self.end_by("TERM")
     }
 
     /// Sends a signal, waits for a successful end and returns the rest of the log.
     fn end_by(mut self, signal: &str) -> Vec<String> {
-        let process = self.child.id().to_string();
-        let sent = Command::new("kill").args(["-s", signal, &process]).status();
-        assert!(sent.expect("there is kill").success());
+        self.signal(signal);
         let log = self.log.take().into_iter().flat_map(BufRead::lines);
         let log: Vec<String> = log.map(|line| line.expect("the server writes text")).collect();
         let status = self.child.wait().expect("it is a child");
@@ -216,6 +225,25 @@ fn every_signal_to_end_drains_even_when_nobody_reads_the_log() {
     // As a closed terminal does.
     server.log = None;
     server.end_by("HUP");
+}
+
+#[test]
+fn a_second_signal_ends_the_server_at_once() {
+    let variables = [
+        ("GRASP_LISTEN", "127.0.0.1:0"),
+        ("GRASP_DRAIN_DELAY_MS", "600000"),
+    ];
+    let mut server = Running::start(&variables);
+    server.signal("TERM");
+    let mut log = server.log.take().expect("it is open");
+    let mut line = String::new();
+    while !line.contains("draining") {
+        line.clear();
+        assert!(log.read_line(&mut line).expect("the server writes text") > 0);
+    }
+    server.signal("INT");
+    let status = server.child.wait().expect("it is a child");
+    assert_eq!(status.code(), Some(1));
 }
 
 #[test]

@@ -21,7 +21,7 @@ const SERVER: &[&[&str]] = &[
         "warning_rate",
         "wire",
     ],
-    &["limits", "listen", "metrics", "viewer"],
+    &["limits", "listen", "log_lines", "metrics", "traces", "viewer"],
     &["atlas_slots", "health_check", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "executor", "validate"],

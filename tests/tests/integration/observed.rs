@@ -105,6 +105,40 @@ async fn clients_cannot_make_series() {
     assert!(series(&after).len() < 2000);
 }
 
+/// Metrics that are named in a text: words with the prefixes of this server's.
+fn named(text: &str) -> BTreeSet<&str> {
+    let words = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+    let prefixes = ["grasp_", "grpc_server_", "process_"];
+    words
+        .filter(|word| prefixes.iter().any(|prefix| word.starts_with(prefix)))
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn dashboard_and_alerts_name_metrics_that_the_server_has() {
+    let page = page(&TestServer::start().await).await;
+    let known: BTreeSet<&str> = series(&page)
+        .into_iter()
+        .map(|one| one.split('{').next().unwrap())
+        .collect();
+    let dashboard = include_str!("../../../docker/grafana/grasp.json");
+    serde_json::from_str::<serde_json::Value>(dashboard).expect("the dashboard is JSON");
+    let alerts = include_str!("../../../docker/prometheus/alerts.yaml");
+    for (file, least) in [(dashboard, 30), (alerts, 15)] {
+        let named = named(file);
+        assert!(named.len() >= least, "{named:?}");
+        assert_eq!(named.difference(&known).collect::<Vec<_>>(), [&""; 0]);
+    }
+    // Whoever is alerted finds what to do.
+    let operations = include_str!("../../../server/OPERATIONS.md");
+    for alert in alerts
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("- alert: "))
+    {
+        assert!(operations.contains(&format!("`{alert}`")), "{alert}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn probes_and_metrics_are_all_that_the_port_for_operators_has() {
     let server = TestServer::start().await;

@@ -69,6 +69,7 @@ impl Call {
 fn admitting_one() -> Calls {
     Calls {
         metrics: Arc::default(),
+        traces: Traces::default(),
         in_flight: watch::Sender::new(()),
         uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),
