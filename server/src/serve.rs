@@ -52,6 +52,10 @@ use crate::{
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
 };
 
+type Grasps = GraspServiceServer<Handler>;
+type Objects = ObjectServiceServer<Handler>;
+type Rigs = HandRigServiceServer<Handler>;
+
 /// Largest number of open streams per connection.
 const STREAMS_PER_CONNECTION: u32 = 100;
 
@@ -297,6 +301,16 @@ impl Server {
         self.serve_boxed(listeners, Box::pin(shutdown)).await
     }
 
+    /// The signs of life, which are served until `close` if there is a listener for that.
+    fn monitored(&mut self, close: &CancellationToken) -> Arc<Vitals> {
+        let vitals = Arc::new(Vitals::default());
+        let monitor = Monitor::new(self.handler.clone(), self.builds.clone(), Arc::clone(&vitals));
+        if let Some(listener) = self.monitor.take() {
+            tokio::spawn(close.clone().run_until_cancelled_owned(monitor.serve(listener)));
+        }
+        vitals
+    }
+
     /// Serves. Boxed and without type parameters, so that handlers and transport are compiled with this crate and not once more
     /// with every program that starts a server.
     fn serve_boxed(
@@ -314,14 +328,9 @@ impl Server {
     ) -> Result<(), ServeError> {
         let close = CancellationToken::new();
         let _close_at_the_end = close.clone().drop_guard();
-        let vitals = Arc::new(Vitals::default());
-        let monitor = Monitor::new(self.handler.clone(), self.builds.clone(), Arc::clone(&vitals));
-        let until_closed = |task| tokio::spawn(close.clone().run_until_cancelled_owned(task));
-        if let Some(listener) = self.monitor.take() {
-            until_closed(Box::pin(monitor.serve(listener)) as BoxFuture<'static, ()>);
-        }
-        let traces =
-            Traces::start(self.handler.config.otlp_endpoint.as_deref()).map_err(ServeError::Traces)?;
+        let vitals = self.monitored(&close);
+        let traces = Traces::start(self.handler.config.otlp_endpoint.as_deref());
+        let traces = traces.map_err(ServeError::Traces)?;
         self.read_saved().await?;
         let Self {
             handler,
@@ -331,28 +340,11 @@ impl Server {
         } = self;
         let config = &handler.config;
         let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
-        let grasps = GraspServiceServer::new(handler.clone())
-            .accept_compressed(Gzip)
-            .max_decoding_message_size(MAX_FIND_REQUEST)
-            .max_encoding_message_size(MAX_RESPONSE);
-        let objects = ObjectServiceServer::new(handler.clone())
-            .accept_compressed(Gzip)
-            .max_encoding_message_size(MAX_RESPONSE);
-        let objects = BySize {
-            small: objects.clone().max_decoding_message_size(MAX_FIND_REQUEST),
-            large: objects.max_decoding_message_size(largest_upload),
-        };
-        let rigs = HandRigServiceServer::new(handler.clone())
-            .accept_compressed(Gzip)
-            .max_encoding_message_size(MAX_RESPONSE);
-        let rigs = BySize {
-            small: rigs.clone().max_decoding_message_size(MAX_FIND_REQUEST),
-            large: rigs.max_decoding_message_size(largest_upload),
-        };
+        let (grasps, objects, rigs) = services(&handler, largest_upload);
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, true, true).await;
         let watch = Arc::clone(&vitals).watch(handler.executor.clone(), files, health.clone());
-        until_closed(Box::pin(watch));
+        tokio::spawn(close.clone().run_until_cancelled_owned(watch));
         vitals.enter(Phase::Serving);
 
         let stop = handler.shutdown.clone();
@@ -415,19 +407,9 @@ impl Server {
         let _stop_at_the_end = stop.clone().drop_guard();
         let shutting_down = async {
             shutdown.await;
-            tracing::info!(calls = handler.calls.receiver_count(), "draining");
-            drop(handler.atlases.stopper());
             vitals.enter(Phase::Draining);
             set_health(&health, false, false).await;
-            tokio::time::sleep(config.drain_delay).await;
-            stop.cancel();
-            let ended = tokio::time::timeout(config.drain, handler.calls.closed()).await;
-            if ended.is_err() {
-                let calls = handler.calls.receiver_count();
-                tracing::warn!(calls, "the drain time has passed; cutting off running calls");
-            }
-            drained.cancel();
-            tokio::time::sleep(LINGER).await;
+            drain(&handler, &drained).await;
             // The transport would wait for idle connections and open streams forever.
             close.cancel();
             std::future::pending::<()>().await;
@@ -442,6 +424,45 @@ impl Server {
         tracing::info!("stopped");
         Ok(())
     }
+}
+
+/// The services of the contract, each with the limits of its messages.
+fn services(handler: &Handler, largest_upload: usize) -> (Grasps, BySize<Objects>, BySize<Rigs>) {
+    let grasps = GraspServiceServer::new(handler.clone())
+        .accept_compressed(Gzip)
+        .max_decoding_message_size(MAX_FIND_REQUEST)
+        .max_encoding_message_size(MAX_RESPONSE);
+    let objects = ObjectServiceServer::new(handler.clone())
+        .accept_compressed(Gzip)
+        .max_encoding_message_size(MAX_RESPONSE);
+    let objects = BySize {
+        small: objects.clone().max_decoding_message_size(MAX_FIND_REQUEST),
+        large: objects.max_decoding_message_size(largest_upload),
+    };
+    let rigs = HandRigServiceServer::new(handler.clone())
+        .accept_compressed(Gzip)
+        .max_encoding_message_size(MAX_RESPONSE);
+    let rigs = BySize {
+        small: rigs.clone().max_decoding_message_size(MAX_FIND_REQUEST),
+        large: rigs.max_decoding_message_size(largest_upload),
+    };
+    (grasps, objects, rigs)
+}
+
+/// Lets running calls end, and then ends the others, too.
+async fn drain(handler: &Handler, drained: &CancellationToken) {
+    let config = &handler.config;
+    tracing::info!(calls = handler.calls.receiver_count(), "draining");
+    drop(handler.atlases.stopper());
+    tokio::time::sleep(config.drain_delay).await;
+    handler.shutdown.cancel();
+    let ended = tokio::time::timeout(config.drain, handler.calls.closed()).await;
+    if ended.is_err() {
+        let calls = handler.calls.receiver_count();
+        tracing::warn!(calls, "the drain time has passed; cutting off running calls");
+    }
+    drained.cancel();
+    tokio::time::sleep(LINGER).await;
 }
 
 fn logged(path: &Path, objects: Vec<PinnedObject>) -> Vec<PinnedObject> {

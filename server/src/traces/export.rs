@@ -60,8 +60,8 @@ impl Collector for Exporter {
         let clock = Clock::now();
         let caller = call.traceparent.and_then(|header| header.to_str().ok());
         let caller = caller.map(|header| ("traceparent".to_owned(), header.to_owned()));
-        let caller =
-            TraceContextPropagator::new().extract_with_context(&Context::new(), &HashMap::from_iter(caller));
+        let caller = TraceContextPropagator::new()
+            .extract_with_context(&Context::new(), &HashMap::<String, String>::from_iter(caller));
         let (service, method) = call.method.split_once('/').unwrap_or(("", call.method));
         let mut attributes = vec![
             KeyValue::new("rpc.system", "grpc"),

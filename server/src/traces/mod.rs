@@ -60,6 +60,10 @@ impl Traces {
     ///
     /// # Errors
     /// Says in words why they cannot be sent.
+    #[cfg_attr(
+        not(feature = "otlp"),
+        expect(clippy::unnecessary_wraps, reason = "exporters may fail")
+    )]
     pub(crate) fn start(endpoint: Option<&str>) -> Result<Self, String> {
         #[cfg(feature = "otlp")]
         if let Some(endpoint) = endpoint {
