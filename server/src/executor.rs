@@ -1,19 +1,25 @@
 //! The search pool: admits jobs, runs them off the async runtime, stops them, and contains their panics.
 //!
-//! Each job has a coordinating thread that waits for the workers, so that no thread of the async runtime blocks. The
+//! Each job has a coordinating thread that waits for its turns at the workers, so that no thread of the async runtime blocks. The
 //! workers' threads are named `grasp-search-N` and shared by all jobs.
 
 use std::{
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
     time::{Duration, Instant},
 };
 
+use grasp_admission::{Gate, Job, TooLate};
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::{
+    client::Client,
     error::{Limit, ServiceError},
     limits::{Place, Places},
+    metrics::Histogram,
 };
 
 /// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond
@@ -23,15 +29,92 @@ pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
+/// Jobs that have a turn at once: the second one keeps the workers busy while the first one begins or ends.
+const TURNS: usize = 2;
+
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
     /// A place per running or waiting job.
     pub places: Places,
+    gate: Gate<Client>,
+    /// How long jobs waited for their turns.
+    pub queue: Arc<Histogram>,
+}
+
+/// How long a job has waited for its turns, of which it has one per slice.
+#[derive(Debug, Default)]
+pub(crate) struct QueueTime(AtomicU64);
+
+impl QueueTime {
+    fn add(&self, time: Duration) {
+        let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        self.0.fetch_add(ns, Ordering::Relaxed);
+    }
+
+    pub(crate) fn get(&self) -> Duration {
+        Duration::from_nanos(self.0.load(Ordering::Relaxed))
+    }
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
-pub(crate) type Admission = Place;
+#[derive(Debug)]
+pub(crate) struct Admission {
+    job: Arc<Job<Client>>,
+    queue_time: Arc<QueueTime>,
+    _place: Place,
+}
+
+impl Admission {
+    /// Sets when the job has to end, and whether it goes on as long as there is time, for which others do not wait.
+    pub(crate) fn set_due(&self, due: Instant, yields: bool) {
+        self.job.set_due(due, yields);
+    }
+
+    pub(crate) fn queue_time(&self) -> Arc<QueueTime> {
+        Arc::clone(&self.queue_time)
+    }
+
+    /// Ends a job that needed no turn.
+    pub(crate) fn done(self) {
+        self.job.done();
+    }
+}
+
+/// The workers, as the job on this thread sees them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Workers<'a> {
+    pool: &'a ThreadPool,
+    /// `None` for a job that has the workers for itself.
+    job: Option<(&'a Job<Client>, &'a QueueTime)>,
+}
+
+impl Workers<'_> {
+    #[cfg(test)]
+    pub(crate) fn alone(pool: &ThreadPool) -> Workers<'_> {
+        Workers { pool, job: None }
+    }
+
+    /// Does a slice of the job's work when its turn has come; at once if the job is over, which the work notices.
+    pub(crate) fn in_turn<T>(self, work: impl FnOnce(&ThreadPool) -> T) -> T {
+        let _turn = self.job.and_then(|(job, queue_time)| {
+            let start = Instant::now();
+            let turn = job.turn();
+            queue_time.add(start.elapsed());
+            turn
+        });
+        work(self.pool)
+    }
+}
+
+/// Cancels a job when its call is dropped.
+struct Waiting(Arc<Job<Client>>);
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.0.cancel();
+    }
+}
 
 impl SearchExecutor {
     /// A pool of `workers` threads that admits up to `maximum` jobs.
@@ -45,6 +128,20 @@ impl SearchExecutor {
         Ok(Self {
             pool: Arc::new(pool),
             places: Places::new(Limit::Searches, maximum, RETRY_AFTER),
+            gate: Gate::new(TURNS),
+            queue: Arc::default(),
+        })
+    }
+
+    /// Admits a job that has to end when it is due, unless there is no place or too little time for it.
+    pub(crate) fn admit(&self, client: &Client, due: Instant) -> Result<Admission, ServiceError> {
+        let place = self.places.take(client)?;
+        let job = self.gate.admit(client.clone(), Instant::now(), due);
+        let job = job.map_err(|TooLate { expected }| ServiceError::WouldMissDeadline { expected })?;
+        Ok(Admission {
+            job: Arc::new(job),
+            queue_time: Arc::default(),
+            _place: place,
         })
     }
 
@@ -52,22 +149,33 @@ impl SearchExecutor {
         self.pool.current_num_threads()
     }
 
-    /// Runs work of microseconds on the pool, in its turn.
+    /// Runs work of microseconds on the pool.
     pub(crate) fn spawn(&self, work: impl FnOnce() + Send + 'static) {
         self.pool.spawn(work);
     }
 
-    /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
+    /// Runs a job and waits for it. The job gets the workers and is to stop when the returned future is dropped.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         admission: Admission,
-        job: impl FnOnce(&ThreadPool, Stop<'_>) -> T + Send + 'static,
+        job: impl FnOnce(Workers<'_>, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let pool = Arc::clone(&self.pool);
-        run_stoppable(None, move |stop| {
+        let (pool, queue) = (Arc::clone(&self.pool), Arc::clone(&self.queue));
+        let _waiting = Waiting(Arc::clone(&admission.job));
+        run_blocking(move || {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
-            let _admission = admission;
-            job(&pool, stop)
+            let admission = admission;
+            let of_job = &*admission.job;
+            let workers = Workers {
+                pool: &pool,
+                job: Some((of_job, &admission.queue_time)),
+            };
+            let output = job(workers, Stop::when(&|| of_job.is_cancelled()));
+            queue.record(admission.queue_time.get());
+            if !of_job.is_cancelled() {
+                of_job.done();
+            }
+            output
         })
         .await
     }
@@ -119,24 +227,29 @@ mod tests {
     use std::thread;
 
     use super::*;
-    use crate::client::Client;
 
     #[tokio::test]
     async fn panic_in_a_worker_ends_only_its_own_job() {
         let executor = SearchExecutor::new(2, 8).expect("threads start");
+        let admit = || {
+            let due = Instant::now() + Duration::from_mins(1);
+            executor.admit(&Client::Local, due).unwrap()
+        };
         for _ in 0..8 {
-            let bad = executor.run(executor.places.take(&Client::Local).unwrap(), |pool, _| {
-                pool.in_place_scope(|scope| {
-                    scope.spawn(|_| panic!("on purpose"));
-                    scope.spawn(|_| {});
+            let bad = executor.run(admit(), |workers, _| {
+                workers.in_turn(|pool| {
+                    pool.in_place_scope(|scope| {
+                        scope.spawn(|_| panic!("on purpose"));
+                        scope.spawn(|_| {});
+                    });
                 });
             });
-            let good = executor.run(executor.places.take(&Client::Local).unwrap(), |_, _| 7);
+            let good = executor.run(admit(), |_, _| 7);
             assert_eq!(tokio::join!(bad, good), (Err(ServiceError::Panicked), Ok(7)));
         }
         let threads = executor
-            .run(executor.places.take(&Client::Local).unwrap(), |pool, _| {
-                pool.broadcast(|_| thread::current().name().map(str::to_owned))
+            .run(admit(), |workers, _| {
+                workers.in_turn(|pool| pool.broadcast(|_| thread::current().name().map(str::to_owned)))
             })
             .await
             .unwrap();

@@ -30,9 +30,9 @@
 //! ```text
 //! budget  client  convention  error  methods  middleware  warning_rate  wire
 //! limits  listen  log_lines  metrics  traces  viewer
-//! atlas_slots  health_check  net  saved  web
+//! atlas_slots  executor  health_check  net  saved  web
 //! rigs
-//! answer  call  config  executor  validate
+//! answer  call  config  validate
 //! connect  memory  objects  track
 //! atlases
 //! search

@@ -1,11 +1,13 @@
 //! Bounds and locks that more than one module needs.
 
 use std::{
-    collections::{HashMap, hash_map::Entry},
+    collections::HashMap,
     num::NonZeroUsize,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
     time::Duration,
 };
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::{
     client::Client,
@@ -24,7 +26,7 @@ pub struct StoreLimits {
 /// Bounds on calls that stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StreamLimits {
-    /// Bytes of meshes uploaded in pieces, of all uploads together and thus of one.
+    /// Largest mesh uploaded in pieces, in bytes; all uploads together may have half as much again.
     pub upload_bytes: NonZeroUsize,
     /// Longest pause between the pieces of an upload.
     pub upload_idle: Duration,
@@ -49,52 +51,30 @@ pub(crate) const MAX_RESPONSE: usize = 4 << 20;
 /// Largest piece of an uploaded mesh, in bytes.
 pub(crate) const MAX_PIECE: usize = 1 << 20;
 
-/// Most places that a client holds, relative to those that would still be free; see [`may_hold_another`].
-const MAX_SHARE: usize = 3;
-
-/// True if a client may take another of the places that clients share, of which `free` are left: it has none, or would hold at most
-/// three times those left then. So a client alone has three quarters, `n` greedy ones an `n + 1/3`th each, and one more client still
-/// finds a place (A. K. Choudhury and E. L. Hahne, "Dynamic queue length thresholds for shared-memory packet switches", 1998).
-pub(crate) fn may_hold_another(held: usize, free: usize) -> bool {
-    free > 0 && (held == 0 || held < MAX_SHARE * (free - 1))
+/// Bytes that all uploads in pieces share, by the largest of them, which leaves a third to others.
+pub(crate) fn shared_upload_bytes(largest: usize) -> usize {
+    largest.saturating_add(largest / 2)
 }
 
-/// Places that clients share, and that are taken as long as their [`Place`] lives.
-#[derive(Clone, Debug)]
-pub(crate) struct Places(Arc<SharedPlaces>);
+/// A place of a client.
+pub(crate) type Place = grasp_admission::Place<Client>;
 
-#[derive(Debug)]
-struct SharedPlaces {
+/// Places that clients share fairly, and that are taken as long as their [`Place`] lives.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
     limit: Limit,
-    maximum: usize,
     /// When a client without a place should try again.
     retry_after: Duration,
-    held: Mutex<Held>,
-}
-
-#[derive(Debug, Default)]
-struct Held {
-    total: usize,
-    /// Clients that hold places.
-    by_client: HashMap<Client, usize>,
-}
-
-/// One or more places of a client.
-#[derive(Debug)]
-pub(crate) struct Place {
-    of: Places,
-    client: Client,
-    count: usize,
+    all: grasp_admission::Places<Client>,
 }
 
 impl Places {
     pub(crate) fn new(limit: Limit, maximum: usize, retry_after: Duration) -> Self {
-        Self(Arc::new(SharedPlaces {
+        Self {
             limit,
-            maximum,
             retry_after,
-            held: Mutex::default(),
-        }))
+            all: grasp_admission::Places::new(maximum),
+        }
     }
 
     /// Takes a place for a client.
@@ -102,31 +82,13 @@ impl Places {
         self.take_many(client, 1)
     }
 
-    /// Takes places for a client; more than one only together.
+    /// Takes some places for a client, together.
     pub(crate) fn take_many(&self, client: &Client, count: usize) -> Result<Place, ServiceError> {
-        let shared = &*self.0;
-        let mut held = locked(&shared.held);
-        let free = shared.maximum - held.total;
-        let of_client = held.by_client.get(client).copied().unwrap_or(0);
-        // The last of them decides; the first ones of a client that has none may be all that are free.
-        let is_allowed = if of_client == 0 {
-            count <= free
-        } else {
-            count <= free && may_hold_another(of_client + count - 1, free + 1 - count)
-        };
-        if !is_allowed {
-            return Err(ServiceError::Overloaded {
-                limit: shared.limit,
-                maximum: shared.maximum,
-                retry_after: shared.retry_after,
-            });
-        }
-        held.total += count;
-        *held.by_client.entry(client.clone()).or_default() += count;
-        Ok(Place {
-            of: self.clone(),
-            client: client.clone(),
-            count,
+        let place = self.all.take(client, count);
+        place.map_err(|_| ServiceError::Overloaded {
+            limit: self.limit,
+            maximum: self.all.maximum(),
+            retry_after: self.retry_after,
         })
     }
 
@@ -136,20 +98,41 @@ impl Places {
     }
 
     pub(crate) fn taken(&self) -> usize {
-        locked(&self.0.held).total
+        self.all.taken()
     }
 }
 
-impl Drop for Place {
-    fn drop(&mut self) {
-        let mut held = locked(&self.of.0.held);
-        held.total -= self.count;
-        if let Entry::Occupied(mut of_client) = held.by_client.entry(self.client.clone()) {
-            *of_client.get_mut() -= self.count;
-            if *of_client.get() == 0 {
-                of_client.remove();
-            }
+/// Permits of each client, so that those of one that has used up its own wait for each other only.
+#[derive(Debug)]
+pub(crate) struct ClientPermits {
+    each: usize,
+    /// The permits of clients that use or wait for some.
+    clients: Mutex<HashMap<Client, Weak<Semaphore>>>,
+}
+
+impl ClientPermits {
+    /// So many permits for each client.
+    pub(crate) fn new(each: usize) -> Self {
+        Self {
+            each,
+            clients: Mutex::default(),
         }
+    }
+
+    /// A permit of a client, once it has one left.
+    pub(crate) async fn acquire(&self, client: &Client) -> Option<OwnedSemaphorePermit> {
+        let permits = {
+            let mut clients = locked(&self.clients);
+            let known = clients.get(client).and_then(Weak::upgrade);
+            known.unwrap_or_else(|| {
+                clients.retain(|_, permits| permits.strong_count() > 0);
+                let permits = Arc::new(Semaphore::new(self.each));
+                clients.insert(client.clone(), Arc::downgrade(&permits));
+                permits
+            })
+        };
+        // Nothing closes the semaphore.
+        permits.acquire_owned().await.ok()
     }
 }
 
@@ -160,53 +143,18 @@ pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 #[cfg(test)]
 mod tests {
+    use futures_util::FutureExt as _;
+
     use super::*;
 
-    fn client(number: u8) -> Client {
-        Client::at([127, 0, 0, number].into())
-    }
-
-    /// How many places each of some greedy clients gets, taking turns.
-    fn shares(maximum: usize, clients: u8) -> Vec<usize> {
-        let places = Places::new(Limit::Searches, maximum, Duration::ZERO);
-        let mut kept = vec![Vec::new(); clients.into()];
-        for _ in 0..maximum {
-            for number in 0..clients {
-                kept[usize::from(number)].extend(places.take(&client(number)).map(Arc::new));
-            }
-        }
-        let shares: Vec<usize> = kept.iter().map(Vec::len).collect();
-        assert_eq!(places.taken(), shares.iter().sum::<usize>());
-        drop(kept);
-        assert_eq!(places.taken(), 0);
-        assert!(locked(&places.0.held).by_client.is_empty());
-        shares
-    }
-
     #[test]
-    fn greedy_clients_leave_a_place_for_one_more() {
-        assert_eq!(shares(64, 1), [48]);
-        assert_eq!(shares(64, 2), [27, 27]);
-        assert_eq!(shares(4, 1), [3]);
-        assert_eq!(shares(2, 1), [1]);
-        assert_eq!(shares(2, 2), [1, 1]);
-        assert_eq!(shares(1, 1), [1]);
-        for clients in 1..12 {
-            let taken: usize = shares(64, clients).iter().sum();
-            assert!(taken < 64, "{clients}");
-        }
-    }
-
-    #[test]
-    fn many_places_are_taken_together_or_not_at_all() {
-        let places = Places::new(Limit::UploadBytes, 100, Duration::ZERO);
-        // The first upload may be as large as all together.
-        drop(places.take_many(&client(1), 100).unwrap());
-        let first = places.take_many(&client(1), 60).unwrap();
-        assert!(places.take_many(&client(1), 20).is_err());
-        assert!(places.take_many(&client(2), 41).is_err());
-        let other = places.take_many(&client(2), 40).unwrap();
-        drop((first, other));
-        assert_eq!(places.taken(), 0);
+    fn a_client_waits_for_its_own_permits_only() {
+        let permits = ClientPermits::new(1);
+        let (one, other) = (Client::Local, Client::at([127, 0, 0, 1].into()));
+        let held = permits.acquire(&one).now_or_never().flatten();
+        assert!(held.is_some() && permits.acquire(&one).now_or_never().is_none());
+        assert!(permits.acquire(&other).now_or_never().is_some());
+        drop(held);
+        assert!(permits.acquire(&one).now_or_never().flatten().is_some());
     }
 }

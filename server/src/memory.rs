@@ -8,7 +8,10 @@
 
 use std::{fs, path::Path};
 
-use crate::config::{Config, StorePlace};
+use crate::{
+    config::{Config, StorePlace},
+    limits::shared_upload_bytes,
+};
 
 /// Smallest number that means "no limit": version 1 of control groups writes the largest multiple of the page size.
 const UNLIMITED: u64 = 1 << 62;
@@ -32,7 +35,7 @@ fn configured_bytes(config: &Config) -> u64 {
     let bounds = [
         config.store.bytes,
         uploads,
-        config.streams.upload_bytes.get() / 3 * 4,
+        shared_upload_bytes(config.streams.upload_bytes.get()),
         loaded,
         config.maximum_unread_bytes.get(),
     ];
@@ -124,12 +127,12 @@ mod tests {
             ..Config::default()
         };
         // docker/README.md has this figure.
-        assert_eq!(configured_bytes(&image), 832 << 20);
+        assert_eq!(configured_bytes(&image), 960 << 20);
         let saving = Config {
             place: StorePlace::Folder("/saved".into()),
             ..image.clone()
         };
-        assert_eq!(configured_bytes(&saving), (832 + 256) << 20);
+        assert_eq!(configured_bytes(&saving), (960 + 256) << 20);
         let largest = Config {
             maximum_uploads: NonZeroUsize::MAX,
             ..image

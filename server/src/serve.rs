@@ -32,7 +32,7 @@ use crate::{
     connect::{Connect, Transcoding},
     error::Limit,
     executor::SearchExecutor,
-    limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
+    limits::{BYTES_BESIDES_MESH, ClientPermits, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
     listen::Listener,
     middleware::Around,
     monitor::{Monitor, Phase, Vitals, set_health},
@@ -233,6 +233,7 @@ impl Server {
             )),
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),
+            heavy: Arc::new(ClientPermits::new(config.heavy_work())),
             ahead: Semaphore::new(1),
             created: AtomicU64::new(0),
             upload_bytes: upload_places(config.streams.upload_bytes.get()),
@@ -339,8 +340,8 @@ impl Server {
             ..
         } = self;
         let config = &handler.config;
-        let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
-        let (grasps, objects, rigs) = services(&handler, largest_upload);
+        let largest_upload = largest_upload(config);
+        let (grasps, objects, rigs) = services(&handler);
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, true, true).await;
         let watch = Arc::clone(&vitals).watch(handler.executor.clone(), files, health.clone());
@@ -377,19 +378,7 @@ impl Server {
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(Around(Calls {
-                metrics: Arc::clone(&handler.metrics),
-                traces: traces.clone(),
-                in_flight: handler.calls.clone(),
-                uploads: builds,
-                upload_grace: 2 * config.streams.upload_idle,
-                packers: Arc::clone(&packers),
-                largest_upload,
-                reserve: Arc::clone(&handler.reserve),
-                shutdown: stop.clone(),
-                drained: drained.clone(),
-                longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
-            }))
+            .layer(Around(calls(&handler, builds, &packers, &traces, &drained)))
             .layer(Around(Transcoding {
                 largest_upload,
                 places: packers,
@@ -427,7 +416,8 @@ impl Server {
 }
 
 /// The services of the contract, each with the limits of its messages.
-fn services(handler: &Handler, largest_upload: usize) -> (Grasps, BySize<Objects>, BySize<Rigs>) {
+fn services(handler: &Handler) -> (Grasps, BySize<Objects>, BySize<Rigs>) {
+    let largest_upload = largest_upload(&handler.config);
     let grasps = GraspServiceServer::new(handler.clone())
         .accept_compressed(Gzip)
         .max_decoding_message_size(MAX_FIND_REQUEST)
@@ -495,4 +485,36 @@ fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+}
+
+/// Largest message of an upload, in bytes.
+fn largest_upload(config: &Config) -> usize {
+    config.maximum_object_bytes.get() + BYTES_BESIDES_MESH
+}
+
+fn calls(
+    handler: &Handler,
+    builds: Places,
+    packers: &Arc<Semaphore>,
+    traces: &Traces,
+    drained: &CancellationToken,
+) -> Calls {
+    let config = &handler.config;
+    Calls {
+        metrics: Arc::clone(&handler.metrics),
+        traces: traces.clone(),
+        in_flight: handler.calls.clone(),
+        executor: handler.executor.clone(),
+        longest_search: config.budgets.maximum,
+        uploads: builds,
+        heavy: Arc::clone(&handler.heavy),
+        reads: Arc::default(),
+        upload_grace: 2 * config.streams.upload_idle,
+        packers: Arc::clone(packers),
+        largest_upload: largest_upload(config),
+        reserve: Arc::clone(&handler.reserve),
+        longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
+        shutdown: handler.shutdown.clone(),
+        drained: drained.clone(),
+    }
 }

@@ -1,6 +1,6 @@
 //! A server inside the test, on its own port, and values of the core as its messages.
 
-use std::net::{Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use grasp_client::GraspClient;
 use grasp_proto::v1::{
@@ -24,6 +24,8 @@ const WORKERS: usize = 2;
 #[derive(Debug)]
 pub struct TestServer {
     address: SocketAddr,
+    /// Where it also listens.
+    second: SocketAddr,
     monitor: SocketAddr,
     gauges: Gauges,
     stop: DropGuard,
@@ -45,15 +47,18 @@ impl TestServer {
             ..Config::default()
         };
         adapt(&mut config);
-        let (listener, address) = listen().await;
-        let (monitor_listener, monitor) = listen().await;
+        let (listener, address) = listen(Ipv6Addr::LOCALHOST).await;
+        let (also, second) = listen(Ipv4Addr::LOCALHOST).await;
+        let (monitor_listener, monitor) = listen(Ipv6Addr::LOCALHOST).await;
         let server = Server::new(config).expect("the server starts");
         let server = server.monitored_on(monitor_listener.into());
         let gauges = server.gauges();
         let stop = CancellationToken::new();
-        let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));
+        let serving =
+            tokio::spawn(server.serve([listener.into(), also.into()], stop.clone().cancelled_owned()));
         Self {
             address,
+            second,
             monitor,
             gauges,
             stop: stop.drop_guard(),
@@ -90,6 +95,13 @@ impl TestServer {
             .connect()
             .await
             .expect("the server accepts connections")
+    }
+
+    /// A connection of another client: it comes from another address.
+    pub async fn other_channel(&self) -> Channel {
+        let endpoint = Endpoint::from_shared(format!("http://{}", self.second));
+        let endpoint = endpoint.expect("an address is a valid endpoint");
+        endpoint.connect().await.expect("the server accepts connections")
     }
 
     /// The project's own client, on a new connection.
@@ -164,8 +176,8 @@ impl StoppingServer {
     }
 }
 
-async fn listen() -> (TcpListener, SocketAddr) {
-    let listener = TcpListener::bind((Ipv6Addr::LOCALHOST, 0)).await;
+async fn listen(interface: impl Into<IpAddr>) -> (TcpListener, SocketAddr) {
+    let listener = TcpListener::bind((interface.into(), 0)).await;
     let listener = listener.expect("a free port of the loopback interface");
     let address = listener.local_addr().expect("a bound socket has an address");
     (listener, address)

@@ -16,15 +16,17 @@ use super::{
     CallContext, LOGGED_PACKAGE, OpenCall,
     ending::ended_by,
     packing::{accepts_gzip, packing},
+    reads::{Reads, is_read},
     upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
 use crate::{
     budget::DeadlineReserve,
     client::Client,
     error::{ServiceError, blame_client},
-    limits::{MAX_FIND_REQUEST, Places},
+    executor::SearchExecutor,
+    limits::{ClientPermits, MAX_FIND_REQUEST, Place, Places, locked},
     metrics::Metrics,
-    middleware::{Answer, Middleware},
+    middleware::{Answer, Middleware, filtered},
     net::{Reader, arriving},
     traces::Traces,
 };
@@ -35,6 +37,14 @@ const UPLOAD_METHODS: [&str; 4] = [
     "/grasp.v1.ObjectService/UpdateObject",
     STREAMED_UPLOAD,
     "/grasp.v1.HandRigService/CreateRig",
+];
+
+/// Methods that search.
+const SEARCH_METHODS: [&str; 4] = [
+    "/grasp.v1.GraspService/FindGrasp",
+    "/grasp.v1.GraspService/StreamGrasps",
+    "/grasp.v1.GraspService/ValidateGrasp",
+    "/grasp.v1.GraspService/EvaluateHoldout",
 ];
 
 /// Path of the upload in pieces, which limits its own time.
@@ -63,8 +73,16 @@ pub(crate) struct Calls {
     pub traces: Traces,
     /// Has a receiver per call in flight.
     pub in_flight: watch::Sender<()>,
+    /// Admits searches.
+    pub executor: SearchExecutor,
+    /// Longest time of a search.
+    pub longest_search: Duration,
     /// One place per concurrent upload.
     pub uploads: Places,
+    /// Permits of each client to build or prepare something.
+    pub heavy: Arc<ClientPermits>,
+    /// Lets calls that read or delete take turns.
+    pub reads: Arc<Reads>,
     /// Longest pause in an upload.
     pub upload_grace: Duration,
     /// One permit per thread that packs messages.
@@ -82,6 +100,17 @@ pub(crate) struct Calls {
 }
 
 impl Calls {
+    /// Admits a search, or a call that reads or deletes, which then waits for its turn.
+    fn admit(&self, path: &str, context: &CallContext) -> Result<Option<Place>, ServiceError> {
+        let client = &context.client;
+        if SEARCH_METHODS.contains(&path) {
+            let due = context.latest_end(self.longest_search);
+            let admission = self.executor.admit(client, due)?;
+            *locked(&context.record.admission) = Some(admission);
+        }
+        is_read(path).then(|| self.reads.enter(client)).transpose()
+    }
+
     /// When and with which error an unanswered call ends.
     fn end(&self, path: &str, context: &CallContext) -> Option<(Instant, ServiceError)> {
         let before = |deadline: Instant| deadline.checked_sub(BEFORE_TRANSPORT).unwrap_or(deadline);
@@ -118,8 +147,14 @@ impl Middleware<Body> for Calls {
             Ok(place) => place,
             Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
         };
+        // Refused before the message is read, which costs more than the refusal.
+        let admitted = match self.admit(path, &context) {
+            Ok(admitted) => admitted,
+            Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
+        };
         let end = self.end(path, &context);
-        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads, context.client.clone()));
+        let upload =
+            is_upload(path).then(|| UploadPermit::new(&self.uploads, &self.heavy, context.client.clone()));
         // Beyond these bytes, an upload has a place and needs no other bound.
         let (largest, most_counted) = match upload {
             Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),
@@ -127,6 +162,7 @@ impl Middleware<Body> for Calls {
         };
         let ends = (!path.starts_with(LOGGED_PACKAGE)).then(|| self.shutdown.clone());
         let packs = !AWAITED_STREAMS.contains(&path) && accepts_gzip(request.headers());
+        let client = context.client.clone();
         request.extensions_mut().insert(context);
         let (mut request, arriving) = arriving(request, most_counted);
         if let Some(permit) = upload {
@@ -135,11 +171,19 @@ impl Middleware<Body> for Calls {
             request = request.map(|body| bounded_upload(body, permit, grace));
         }
         let answer = next(request);
-        let packers = Arc::clone(&self.packers);
+        let (packers, reads) = (Arc::clone(&self.packers), Arc::clone(&self.reads));
         let drained = self.drained.clone();
         let answer = async move {
+            let turn = match admitted {
+                Some(entered) => Some(reads.turn(entered, &client).await),
+                None => None,
+            };
             let answer = answer.await?;
             drop(place);
+            let answer = match turn {
+                Some(turn) => answer.map(|inner| filtered(inner, turn)),
+                None => answer,
+            };
             Ok(match reader.map_or(Ok(()), |reader| reader.admit()) {
                 Err(error) => refusal(error),
                 Ok(()) if packs => packing(answer, packers),

@@ -6,12 +6,13 @@
 mod ending;
 mod layer;
 mod packing;
+mod reads;
 mod request_id;
 mod upload;
 
 use std::{
     borrow::Cow,
-    sync::{Arc, OnceLock},
+    sync::{Arc, Mutex, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
@@ -32,6 +33,8 @@ use crate::{
     budget::{DeadlineReserve, parse_grpc_timeout},
     client::Client,
     error::add_request_id,
+    executor::{Admission, QueueTime},
+    limits::locked,
     metrics::{Method, Metrics},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
     traces::{CallTrace, Interval, Traces},
@@ -63,12 +66,14 @@ struct CallRecord {
     search: OnceLock<SearchSummary>,
     /// When the object was prepared for searches, if it was not.
     preparation: OnceLock<Interval>,
-    /// When the search was ready for its workers.
-    ready: OnceLock<Instant>,
+    /// How long the search has waited for its turns.
+    queue_time: OnceLock<Arc<QueueTime>>,
     /// When the search has to end.
     due: OnceLock<Instant>,
     /// When it ended.
     ended: OnceLock<Instant>,
+    /// The right to search, until the handler takes it.
+    admission: Mutex<Option<Admission>>,
 }
 
 /// Log record of a search.
@@ -122,6 +127,17 @@ impl CallContext {
         self.request_id.to_str().unwrap_or_default()
     }
 
+    /// The right to search that the call came with. Parts of a call have none.
+    pub(crate) fn take_admission(&self) -> Option<Admission> {
+        locked(&self.record.admission).take()
+    }
+
+    /// When a search that takes at most `longest` has to end.
+    pub(crate) fn latest_end(&self, longest: Duration) -> Instant {
+        let latest = self.arrived + longest;
+        self.deadline.map_or(latest, |deadline| deadline.min(latest))
+    }
+
     /// When a call that is no search has to be answered, if it has a deadline.
     pub(crate) fn answer_due(&self) -> Option<Instant> {
         let deadline = self.deadline?;
@@ -131,9 +147,7 @@ impl CallContext {
     /// Records when the search that starts now has to end. A past time counts as now: earlier waiting, such as for the rest of a
     /// request, is no delay of the answer.
     pub(crate) fn search_is_due(&self, due: Instant) {
-        let now = Instant::now();
-        let _ = self.record.ready.set(now);
-        let _ = self.record.due.set(due.max(now));
+        let _ = self.record.due.set(due.max(Instant::now()));
     }
 
     pub(crate) fn search_ended(&self, at: Instant, summary: SearchSummary) {
@@ -143,12 +157,14 @@ impl CallContext {
             failed_check,
             ..
         } = summary;
-        let began = at.checked_sub(time).unwrap_or(at);
-        let ready = self.record.ready.get().copied().unwrap_or(began);
-        let queued = began.saturating_duration_since(ready);
-        self.metrics.searched(queued, time, outcome, failed_check);
+        self.metrics.searched(time, outcome, failed_check);
         let _ = self.record.ended.set(at);
         let _ = self.record.search.set(summary);
+    }
+
+    /// Records the right with which the call's search begins.
+    pub(crate) fn search_begins(&self, admission: &Admission) {
+        let _ = self.record.queue_time.set(admission.queue_time());
     }
 
     /// Records that the object was prepared for searches since then.
@@ -270,16 +286,13 @@ impl OpenCall {
         let began = ended
             .zip(search)
             .and_then(|(ended, search)| ended.checked_sub(search.time));
+        // All of it together, as if the search had waited for its first turn only.
+        let queue_time = record.queue_time.get().map(|queue_time| queue_time.get());
         let parts = [
             ("preparation", record.preparation.get().copied()),
             (
                 "queue",
-                record
-                    .ready
-                    .get()
-                    .copied()
-                    .zip(began)
-                    .map(|(ready, began)| (ready.min(began), began)),
+                began.map(|began| (began, began + queue_time.unwrap_or_default())),
             ),
             ("search", began.zip(ended)),
         ];
@@ -350,6 +363,7 @@ impl Drop for OpenCall {
                     outcome = search.map(|s| s.outcome),
                     attempts = search.map(|s| s.attempts),
                     search_us = search.map(|s| micros(s.time)),
+                    queue_us = record.queue_time.get().map(|queue_time| micros(queue_time.get())),
                     reserve_us = record.reserve.get().copied().map(micros),
                     total_us,
                     %status,

@@ -124,7 +124,7 @@ impl Default for Config {
                 upload_bytes: non_zero(256 << 20),
                 upload_idle: Duration::from_secs(10),
                 watchers: non_zero(64),
-                tracks: non_zero(200),
+                tracks: non_zero(256),
                 track_idle: Duration::from_secs(10),
             },
             maximum_object_bytes: non_zero(8 << 20),
@@ -187,6 +187,12 @@ impl Config {
     /// Number of objects that are prepared for searches at a time: half as many as are received, because that takes less time.
     pub(crate) fn derivations(&self) -> usize {
         self.maximum_uploads.get().div_ceil(2)
+    }
+
+    /// Number of objects and rigs that one client builds or prepares at a time: those take a core each, of which other clients keep
+    /// half.
+    pub(crate) fn heavy_work(&self) -> usize {
+        (self.workers.get() / 2).clamp(1, self.maximum_uploads.get())
     }
 
     /// Largest mesh file in bytes, in one message or in pieces.

@@ -65,7 +65,7 @@ pub struct RawConfig {
     /// Most objects received, built or changed at a time; others are rejected [default: 4].
     #[arg(long, env = "GRASP_MAXIMUM_UPLOADS", value_name = "COUNT")]
     pub maximum_uploads: Option<u64>,
-    /// Bytes of meshes uploaded in pieces, of all uploads together and thus of one [default: 268435456].
+    /// Largest mesh uploaded in pieces, in bytes; all uploads together may have half as much again [default: 268435456].
     #[arg(long, env = "GRASP_MAXIMUM_UPLOAD_BYTES", value_name = "BYTES")]
     pub maximum_upload_bytes: Option<u64>,
     /// Longest pause between the pieces of an upload, in milliseconds [default: 10000].
@@ -74,7 +74,7 @@ pub struct RawConfig {
     /// Most watchers of objects; others are rejected [default: 64].
     #[arg(long, env = "GRASP_MAXIMUM_WATCHERS", value_name = "COUNT")]
     pub maximum_watchers: Option<u64>,
-    /// Most tracks of moving givers; others are rejected [default: 200].
+    /// Most tracks of moving givers; others are rejected [default: 256].
     #[arg(long, env = "GRASP_MAXIMUM_TRACKS", value_name = "COUNT")]
     pub maximum_tracks: Option<u64>,
     /// Longest time without a frame of a track, in milliseconds [default: 10000].

@@ -46,6 +46,8 @@ pub(crate) enum Limit {
     UploadBytes,
     Watchers,
     Tracks,
+    /// Calls that read or delete.
+    Reads,
     Calls,
 }
 
@@ -69,6 +71,10 @@ impl Limit {
             ),
             Self::Watchers => ("the server is at its limit of watchers", R::TooManyWatchers),
             Self::Tracks => ("the server is at its limit of tracks", R::TooManyTracks),
+            Self::Reads => (
+                "the server is at its limit of calls that read or delete",
+                R::TooManyReads,
+            ),
             Self::Calls => (
                 "this connection is at its limit of concurrent calls",
                 R::TooManyCalls,
@@ -130,6 +136,11 @@ pub(crate) enum ServiceError {
         limit: Limit,
         maximum: usize,
         retry_after: Duration,
+    },
+    #[error("searches that wait leave too little time before the deadline; try again")]
+    WouldMissDeadline {
+        /// The time until this call would have been answered.
+        expected: Duration,
     },
     #[error("the message has more than {limit} bytes, the limit of this method")]
     MessageTooLarge { limit: usize },

@@ -4,7 +4,7 @@
 //! of an error take less than 4 kB as they are sent, percent-encoded and in base64, with room for other headers and for the id of the
 //! request.
 
-use std::{cmp::Reverse, collections::HashMap};
+use std::{cmp::Reverse, collections::HashMap, time::Duration};
 
 use grasp_proto::v1::ErrorReason;
 use http::Response;
@@ -54,15 +54,25 @@ impl From<ServiceError> for Status {
                 details.add_precondition_failure_violation(kind, name, text);
             }
         }
-        if let E::Overloaded { retry_after, .. } = &error {
-            details.set_retry_info(Some(*retry_after));
+        let retry_after = retry_after(&error);
+        if retry_after.is_some() {
+            details.set_retry_info(retry_after);
         }
         let mut status = Self::with_error_details(code, message, details);
-        if let E::Overloaded { retry_after, .. } = error {
+        if let Some(retry_after) = retry_after {
             let pushback = MetadataValue::from(u64::try_from(retry_after.as_millis()).unwrap_or(u64::MAX));
             status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
         }
         status
+    }
+}
+
+/// When a client should try again, if the server had no room for its call.
+fn retry_after(error: &E) -> Option<Duration> {
+    match error {
+        E::Overloaded { retry_after, .. } => Some(*retry_after),
+        E::WouldMissDeadline { expected } => Some(*expected),
+        _ => None,
     }
 }
 
@@ -87,6 +97,7 @@ fn code_and_reason(error: &E) -> (Code, ErrorReason) {
         E::RigsFull { .. } => (Code::ResourceExhausted, R::TooManyRigs),
         E::StoreFailed => (Code::Unavailable, R::StoreFailed),
         E::Overloaded { limit, .. } => (Code::ResourceExhausted, limit.text_and_reason().1),
+        E::WouldMissDeadline { .. } => (Code::ResourceExhausted, R::WouldMissDeadline),
         // As the transport answers to messages beyond its own limit.
         E::MessageTooLarge { .. } => (Code::OutOfRange, R::MessageTooLarge),
         E::ReaderStalled { .. } => (Code::DeadlineExceeded, R::ReaderStalled),

@@ -8,8 +8,8 @@ use std::{collections::HashMap, time::Duration};
 use grasp_proto::v1;
 use tonic::Code;
 
-pub(crate) use exposition::{CONTENT_TYPE, Counters, Exposition};
-use exposition::{Counter, Histogram};
+use exposition::Counter;
+pub(crate) use exposition::{CONTENT_TYPE, Counters, Exposition, Histogram};
 
 use crate::methods::methods;
 
@@ -33,7 +33,6 @@ pub(crate) struct Metrics {
     by_path: HashMap<&'static str, Method>,
     /// The calls of each method; the last are those of unknown ones.
     calls: Vec<CallMetrics>,
-    queue: Histogram,
     search: Histogram,
     overshoot: Histogram,
     outcomes: Counters,
@@ -97,7 +96,6 @@ impl Default for Metrics {
         Self {
             by_path,
             calls: known.chain([CallMetrics::new("/", UNKNOWN)]).collect(),
-            queue: Histogram::default(),
             search: Histogram::default(),
             overshoot: Histogram::default(),
             outcomes: Counters::new("outcome", OUTCOMES.map(short)),
@@ -142,15 +140,8 @@ impl Metrics {
         self.overshoot.record(time);
     }
 
-    /// Records a search, with its wait for a worker, and the check for which it has no grasp or replaced the current one.
-    pub(crate) fn searched(
-        &self,
-        queued: Duration,
-        time: Duration,
-        outcome: &'static str,
-        failed_check: Option<v1::Check>,
-    ) {
-        self.queue.record(queued);
+    /// Records a search, with the check for which it has no grasp or replaced the current one.
+    pub(crate) fn searched(&self, time: Duration, outcome: &'static str, failed_check: Option<v1::Check>) {
         self.search.record(time);
         self.outcomes.add_value(short(outcome));
         if let Some(check) = failed_check {
@@ -197,11 +188,6 @@ impl Metrics {
             page.histogram(name, &calls.labels(), &calls.time);
         }
         for (name, help, histogram) in [
-            (
-                "grasp_queue_seconds",
-                "Wait of a search for its workers.",
-                &self.queue,
-            ),
             ("grasp_search_seconds", "Time of a search.", &self.search),
             (
                 "grasp_deadline_overshoot_seconds",
@@ -263,7 +249,7 @@ mod tests {
         for number in 0..calls {
             let time = Duration::from_micros(number);
             let method = metrics.call_started("/grasp.v1.GraspService/FindGrasp");
-            metrics.searched(time, time, "OUTCOME_BUDGET_EXHAUSTED", Some(v1::Check::Reach));
+            metrics.searched(time, "OUTCOME_BUDGET_EXHAUSTED", Some(v1::Check::Reach));
             metrics.overshot(time);
             metrics.call_ended(method, Code::Ok, time);
         }

@@ -7,6 +7,13 @@ impl Monitor {
     pub(super) fn page(&self) -> String {
         let mut page = Exposition::default();
         self.handler.metrics.write(&mut page);
+        let name = "grasp_queue_seconds";
+        page.family(
+            name,
+            "histogram",
+            "How long searches waited for their turns at the workers, all together.",
+        );
+        page.histogram(name, &[], &self.handler.executor.queue);
         self.write_places(&mut page);
         self.write_objects(&mut page);
         let name = "grasp_build_info";

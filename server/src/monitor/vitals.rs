@@ -28,7 +28,7 @@ use crate::{
 /// Interval of the search threads' heartbeat, and of changes of the health.
 const BEAT_EVERY: Duration = Duration::from_secs(1);
 
-/// Longest pause of the heartbeat: it waits its turn like any search's slice, of which there may be hundreds of 10 ms.
+/// Longest pause of the heartbeat, which waits for slices of searches, of 10 ms each.
 const MAX_PAUSE: Duration = Duration::from_secs(30);
 
 /// Number of beats from one look at the store to the next.

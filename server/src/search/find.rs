@@ -61,7 +61,10 @@ pub(crate) async fn find(
     }
     let mut job = Box::new(job.prepare()?);
     match job.look_up() {
-        Some(answered) => answered,
+        Some(answered) => {
+            admission.done();
+            answered
+        }
         None => search(running, move || Ok(Arc::from(job)), overdue, executor, admission).await,
     }
 }
@@ -76,11 +79,11 @@ async fn search(
 ) -> Result<Answered, ServiceError> {
     let end = {
         let running = Arc::clone(&running);
-        executor.run(admission, move |pool, stop| {
+        executor.run(admission, move |workers, stop| {
             let job = prepare()?;
             // Fails only if it is set, and nothing else sets it.
             let _ = running.job.set(Arc::clone(&job));
-            job.run(pool, stop, &running.progress)
+            job.run(workers, stop, &running.progress)
         })
     };
     let Some(overdue) = overdue else {
@@ -312,6 +315,11 @@ mod tests {
         }
     }
 
+    fn admitted(executor: &SearchExecutor) -> Admission {
+        let due = Instant::now() + Duration::from_mins(1);
+        executor.admit(&Client::Local, due).unwrap()
+    }
+
     #[tokio::test]
     async fn only_a_call_with_a_deadline_is_answered_before_its_search_has_ended() {
         let executor = SearchExecutor::new(1, 8).expect("threads start");
@@ -319,26 +327,25 @@ mod tests {
         let (release, released) = mpsc::channel::<()>();
         let (started, has_started) = tokio::sync::oneshot::channel();
         let occupied = {
-            let (executor, admission) = (executor.clone(), executor.places.take(&Client::Local).unwrap());
+            let (executor, admission) = (executor.clone(), admitted(&executor));
             tokio::spawn(async move {
                 let occupy = move || {
                     started.send(()).unwrap();
                     released.recv().unwrap();
                 };
-                executor.run(admission, |pool, _| pool.install(occupy)).await
+                executor
+                    .run(admission, |workers, _| {
+                        workers.in_turn(|pool| pool.install(occupy));
+                    })
+                    .await
             })
         };
         has_started.await.unwrap();
         let patient = {
-            let (executor, admission) = (executor.clone(), executor.places.take(&Client::Local).unwrap());
+            let (executor, admission) = (executor.clone(), admitted(&executor));
             tokio::spawn(async move { find(late_job(false), &executor, admission).await })
         };
-        let urgent = find(
-            late_job(true),
-            &executor,
-            executor.places.take(&Client::Local).unwrap(),
-        )
-        .await;
+        let urgent = find(late_job(true), &executor, admitted(&executor)).await;
         let answer = urgent.unwrap().response;
         assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
         assert_eq!(answer.attempts(), 0);

@@ -26,7 +26,6 @@ use grasp_synthesis::{
         settings::SearchSettings,
     },
 };
-use rayon::ThreadPool;
 
 use super::{
     either_hand::search_either,
@@ -39,6 +38,7 @@ use crate::{
     },
     call::SearchSummary,
     error::ServiceError,
+    executor::Workers,
     rigs::RigHand,
     validate::GiverHand,
 };
@@ -128,7 +128,7 @@ impl PreparedJob {
 
     pub(super) fn run(
         &self,
-        pool: &ThreadPool,
+        workers: Workers<'_>,
         stop: Stop<'_>,
         progress: &Progress,
     ) -> Result<Answered, ServiceError> {
@@ -138,13 +138,13 @@ impl PreparedJob {
         {
             return self.answer(ended, Some(verdict));
         }
-        self.answer(self.search(pool, stop, progress), None)
+        self.answer(self.search(workers, stop, progress), None)
     }
 
     /// Searches, without making a response.
-    pub(super) fn search(&self, pool: &ThreadPool, stop: Stop<'_>, progress: &Progress) -> Ended {
+    pub(super) fn search(&self, workers: Workers<'_>, stop: Stop<'_>, progress: &Progress) -> Ended {
         let site = Site {
-            pool,
+            workers,
             clock: &self.find,
             stop,
             progress,

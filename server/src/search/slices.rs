@@ -20,7 +20,7 @@ use grasp_synthesis::{
 };
 use rayon::ThreadPool;
 
-use crate::limits::locked;
+use crate::{executor::Workers, limits::locked};
 
 /// Target duration of a slice: short compared to a budget, and long compared to the 50 µs that starting the workers costs.
 const SLICE: Duration = Duration::from_millis(10);
@@ -184,10 +184,10 @@ impl Progress {
     }
 }
 
-/// The pool, clock, stop and progress of a search's slices.
+/// The workers, clock, stop and progress of a search's slices.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {
-    pub pool: &'a ThreadPool,
+    pub workers: Workers<'a>,
     pub clock: &'a dyn Clock,
     pub stop: Stop<'a>,
     pub progress: &'a Progress,
@@ -244,7 +244,8 @@ impl<'a> Slices<'a> {
     pub(super) fn run(&mut self, attempts: u64) -> SearchOutcome {
         let site = self.site;
         self.next.run.max_attempts = self.left.min(attempts);
-        let outcome = find_grasp(site.pool, &self.scene, &self.next, site.clock, site.stop);
+        let find = |pool: &ThreadPool| find_grasp(pool, &self.scene, &self.next, site.clock, site.stop);
+        let outcome = site.workers.in_turn(find);
         self.next.known.atlas = None;
         self.next.known.learned = None;
         self.next.known.preferred = Arc::default();
@@ -371,7 +372,7 @@ pub(super) mod tests {
         let patience = ReadingsClock::after(patience);
         let progress = Progress::default();
         let site = Site {
-            pool: &pool,
+            workers: Workers::alone(&pool),
             clock: &clock,
             stop: Stop::NEVER,
             progress: &progress,

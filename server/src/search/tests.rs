@@ -35,6 +35,7 @@ use super::{prepared::Answered, slices::Progress, *};
 use crate::{
     convention::Convention,
     error::ServiceError,
+    executor::Workers,
     objects::{StoredObject, tests::tetrahedron},
     rigs::store::RigStore,
     validate::{FindQuery, GiverHand, any_obstacles, evaluate_query, find_query, fixtures, validate_query},
@@ -101,7 +102,7 @@ fn answers_every_request_that_passes_validation() {
         let takes_both = query.other_hand.is_some();
         let changes_only = query.changes_only;
         let prepared = job(query, tetrahedron("any", edge, &[1])).prepare();
-        match prepared.and_then(|job| job.run(pool, Stop::NEVER, &Progress::default())) {
+        match prepared.and_then(|job| job.run(Workers::alone(pool), Stop::NEVER, &Progress::default())) {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.as_ref().expect("every answer has a report");
                 prop_assert!(report.attempts <= 2);
@@ -217,7 +218,7 @@ fn judges_and_rates_every_request_that_passes_validation() {
                     &judged.grasp,
                     judged.find_nearest,
                     judged.warnings,
-                    pool,
+                    Workers::alone(pool),
                     Stop::NEVER,
                 )
             }) {
@@ -239,7 +240,12 @@ fn judges_and_rates_every_request_that_passes_validation() {
             let rated = evaluate_query(evaluate, ("adult", &RigStore::new(0, None)), |_| true);
             match rated.map(|rated| {
                 let find = prepared(rated.holdout);
-                rate(&find, rated.other_presenting_hands, pool, Stop::NEVER)
+                rate(
+                    &find,
+                    rated.other_presenting_hands,
+                    Workers::alone(pool),
+                    Stop::NEVER,
+                )
             }) {
                 Err(error) => assert_named(&error, FIELDS)?,
                 Ok(Err(error)) => assert_named(&error, "holdout")?,

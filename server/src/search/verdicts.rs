@@ -15,7 +15,6 @@ use grasp_synthesis::{
         verdicts::{self, Against, Verdict},
     },
 };
-use rayon::ThreadPool;
 
 use super::{
     job::FindJob,
@@ -27,6 +26,7 @@ use crate::{
     call::SearchSummary,
     convention::Convention,
     error::ServiceError,
+    executor::Workers,
     validate::{GivenGrasp, GiverHand},
 };
 
@@ -37,7 +37,7 @@ pub(crate) fn judge(
     grasp: &GivenGrasp,
     find_nearest: bool,
     mut warnings: Vec<String>,
-    pool: &ThreadPool,
+    workers: Workers<'_>,
     stop: Stop<'_>,
 ) -> Result<Answered<v1::ValidateGraspResponse>, ServiceError> {
     let start = Instant::now();
@@ -47,12 +47,13 @@ pub(crate) fn judge(
     let HandSearch { hand, settings, .. } = &prepared.hands[0];
     let task = prepared.task(0);
     let pose = grasp.at_object(task.rig, frame.client_from_object);
-    let mut judgement = verdicts::judge(task, &settings.query, &pose, stop)?;
+    let mut judgement = workers.in_turn(|_| verdicts::judge(task, &settings.query, &pose, stop))?;
     let nearest = if find_nearest && !judgement.is_valid() {
         let is_over = || prepared.now() >= prepared.budget;
         // A search is due if nothing known is valid.
-        nearest_grasp(task, settings, &pose, Stop::when(&is_over))
-            .or_else(|| prepared.search(pool, stop, &Progress::default()).outcome.grasp)
+        workers
+            .in_turn(|_| nearest_grasp(task, settings, &pose, Stop::when(&is_over)))
+            .or_else(|| prepared.search(workers, stop, &Progress::default()).outcome.grasp)
     } else {
         None
     };
@@ -117,7 +118,7 @@ fn name_obstacle(verdict: &mut Verdict, places: &[usize]) {
 pub(crate) fn rate(
     find: &FindJob,
     other_presenting_hands: Vec<GiverHand>,
-    pool: &ThreadPool,
+    workers: Workers<'_>,
     stop: Stop<'_>,
 ) -> Result<Answered<v1::EvaluateHoldoutResponse>, ServiceError> {
     let start = Instant::now();
@@ -143,7 +144,7 @@ pub(crate) fn rate(
         }
         response
             .ratings
-            .push(rating(place, &prepared, pool, stop, &mut attempts));
+            .push(rating(place, &prepared, workers, stop, &mut attempts));
         stop.check()?;
     }
     rank(&mut response.ratings);
@@ -175,19 +176,23 @@ fn atlases(prepared: &PreparedJob) -> Vec<v1::Atlas> {
 fn rating(
     presenting_hand: u32,
     prepared: &PreparedJob,
-    pool: &ThreadPool,
+    workers: Workers<'_>,
     stop: Stop<'_>,
     attempts: &mut u64,
 ) -> v1::HoldoutRating {
     let is_over = || stop.is_over() || prepared.now() >= prepared.budget;
     let hands = prepared.hands.iter().enumerate();
     let evaluation = hands
-        .map(|(place, hand)| evaluation::evaluate(prepared.task(place), &hand.settings, Stop::when(&is_over)))
+        .map(|(place, hand)| {
+            let evaluate =
+                || evaluation::evaluate(prepared.task(place), &hand.settings, Stop::when(&is_over));
+            workers.in_turn(|_| evaluate())
+        })
         .fold(Evaluation::default(), |sum, hand| sum.with(&hand));
     let valid = evaluation.valid();
     let mut found = None;
     if valid == 0 && !is_over() {
-        let outcome = prepared.search(pool, stop, &Progress::default()).outcome;
+        let outcome = prepared.search(workers, stop, &Progress::default()).outcome;
         *attempts += outcome.report.attempts;
         found = outcome.grasp;
     }

@@ -8,8 +8,7 @@ use std::{
 };
 
 use grasp_proto::v1::{self, grasp_service_server::GraspService};
-use grasp_synthesis::base::stop::Stop;
-use rayon::ThreadPool;
+use grasp_synthesis::{base::stop::Stop, model::strategy::Choice};
 use tonic::{Request, Response, Status, Streaming};
 
 use super::{
@@ -20,7 +19,7 @@ use crate::{
     budget::effective_budget,
     call::CallContext,
     error::ServiceError,
-    executor::{Admission, before},
+    executor::{Admission, Workers, before},
     objects::{derived::ObjectSize, store::Need},
     search::{self, Answered, FindJob, Stream},
     validate::{
@@ -51,12 +50,12 @@ impl Handler {
         &self,
         holdout: FindQuery,
         call: &CallContext,
-        work: impl FnOnce(FindJob, &ThreadPool, Stop<'_>) -> Result<Answered<T>, ServiceError> + Send + 'static,
+        work: impl FnOnce(FindJob, Workers<'_>, Stop<'_>) -> Result<Answered<T>, ServiceError> + Send + 'static,
     ) -> Result<T, ServiceError> {
         let (admission, job) = self.ready(holdout, call).await?;
         let overdue = job.overdue();
         // Boxed: jobs of some kilobytes would make the futures of all calls large.
-        let work = Box::new(move |pool: &ThreadPool, stop: Stop<'_>| work(job, pool, stop));
+        let work = Box::new(move |workers: Workers<'_>, stop: Stop<'_>| work(job, workers, stop));
         let answered = before(overdue, self.executor.run(admission, work)).await???;
         call.search_ended(answered.ended, answered.summary);
         Ok(answered.response)
@@ -67,10 +66,16 @@ impl Handler {
         query: FindQuery,
         call: &CallContext,
     ) -> Result<(Admission, FindJob), ServiceError> {
+        let admission = match call.take_admission() {
+            Some(admission) => admission,
+            None => self
+                .executor
+                .admit(&call.client, call.latest_end(self.config.budgets.maximum))?,
+        };
+        call.search_begins(&admission);
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;
         let held = stored.hold();
-        let admission = self.executor.places.take(&call.client)?;
         // The budget starts after the object's preparation.
         let (mut derived, mut since) = match self.objects.kept(&stored, Need::Call) {
             Some(kept) => (kept, call.arrived),
@@ -79,10 +84,10 @@ impl Handler {
         let size = ObjectSize::of(query.object_size, &stored);
         let mut object = Arc::clone(&stored);
         if let Some(size) = size {
+            let due = call.answer_due();
+            let _turn = before(due, self.heavy.acquire(&call.client)).await?;
             let slot = self.objects.resized(&stored, size)?;
-            let filled = self
-                .resizer
-                .fill(slot, &stored, size, &self.rigs, call.answer_due());
+            let filled = self.resizer.fill(slot, &stored, size, &self.rigs, due);
             object = filled.await?;
             derived = object.derived_until(Stop::NEVER)?;
             since = Instant::now();
@@ -122,6 +127,7 @@ impl Handler {
             query,
         };
         call.search_is_due(job.due());
+        admission.set_due(job.due(), job.query.search.choice == Choice::BestWithinBudget);
         Ok((admission, job))
     }
 
@@ -245,8 +251,8 @@ impl GraspService for Handler {
             find_nearest,
             warnings,
         } = validate_query(request.into_inner(), self.known_rigs(), self.exists())?;
-        let judge = move |job: FindJob, pool: &ThreadPool, stop: Stop<'_>| {
-            search::judge(job, &grasp, find_nearest, warnings, pool, stop)
+        let judge = move |job: FindJob, workers: Workers<'_>, stop: Stop<'_>| {
+            search::judge(job, &grasp, find_nearest, warnings, workers, stop)
         };
         Ok(Response::new(self.examine(holdout, &call, judge).await?))
     }
@@ -260,8 +266,9 @@ impl GraspService for Handler {
             holdout,
             other_presenting_hands: others,
         } = evaluate_query(request.into_inner(), self.known_rigs(), self.exists())?;
-        let rate =
-            move |job: FindJob, pool: &ThreadPool, stop: Stop<'_>| search::rate(&job, others, pool, stop);
+        let rate = move |job: FindJob, workers: Workers<'_>, stop: Stop<'_>| {
+            search::rate(&job, others, workers, stop)
+        };
         Ok(Response::new(self.examine(holdout, &call, rate).await?))
     }
 }

@@ -16,7 +16,7 @@ use crate::{
     call::{CallContext, UploadPermit},
     error::{Limit, ServiceError, Violation},
     executor::run_stoppable,
-    limits::{MAX_PIECE, Place, Places},
+    limits::{MAX_PIECE, Place, Places, shared_upload_bytes},
     objects::{
         Listed,
         glb::glb_pieces,
@@ -36,10 +36,13 @@ const RETRY_UPLOAD_AFTER: Duration = Duration::from_secs(2);
 /// When a client should try again if there are too many watchers.
 const RETRY_WATCH_AFTER: Duration = Duration::from_secs(5);
 
-/// A place per byte of uploads in pieces; the largest of them leaves a quarter to those of other clients.
+/// A place per byte of uploads in pieces.
 pub(crate) fn upload_places(largest: usize) -> Places {
-    let all = largest.saturating_add(largest / 3);
-    Places::new(Limit::UploadBytes, all, RETRY_UPLOAD_AFTER)
+    Places::new(
+        Limit::UploadBytes,
+        shared_upload_bytes(largest),
+        RETRY_UPLOAD_AFTER,
+    )
 }
 
 /// A place per watcher.
@@ -60,7 +63,7 @@ impl Handler {
         let receiving = tokio::time::timeout(MAX_UPLOAD_TIME, self.receive(parts, call)).await;
         let received = receiving.unwrap_or(late);
         let (request, room) = received.map_err(|error| permit.failure().unwrap_or(error))?;
-        permit.take_place()?;
+        permit.take_turn().await?;
         let limits = self.config.mesh_limits(self.config.streams.upload_bytes);
         let (handler, context) = (self.clone(), call.clone());
         let object = run_stoppable(call.answer_due(), move |stop| {

@@ -5,7 +5,10 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use grasp_proto::{
-    v1::{self, grasp_service_client::GraspServiceClient, stream_grasps_request::Sent},
+    v1::{
+        self, grasp_service_client::GraspServiceClient, object_service_client::ObjectServiceClient,
+        stream_grasps_request::Sent,
+    },
     wire_duration,
 };
 use grasp_tests::TestServer;
@@ -159,6 +162,56 @@ async fn calls_beyond_the_limit_of_searches_are_shed() {
         let after = method.call(server.grasps().await, floating_remote(), None).await;
         after.expect("the place is free again");
     }
+}
+
+/// Opens streams until one is refused.
+async fn fill<T>(open: impl AsyncFn() -> Result<T, Status>) -> Vec<T> {
+    let mut opened = Vec::new();
+    loop {
+        match bounded("a stream", open()).await {
+            Ok(stream) => opened.push(stream),
+            Err(status) => {
+                assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
+                return opened;
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_greedy_client_leaves_places_and_time_to_others() {
+    let server = TestServer::start_with(|config| {
+        config.maximum_searches = 8.try_into().unwrap();
+        config.streams.watchers = 8.try_into().unwrap();
+    })
+    .await;
+    let hopeless = long(&server).await;
+    let greedy = server.other_channel().await;
+    let searches = fill(async || {
+        let mut grasps = GraspServiceClient::new(greedy.clone());
+        grasps
+            .stream_grasps(v1::StreamGraspsRequest::from(hopeless.clone()))
+            .await
+    });
+    let searches = searches.await;
+    let watches = fill(async || {
+        let mut objects = ObjectServiceClient::new(greedy.clone());
+        objects.watch_objects(v1::WatchObjectsRequest::default()).await
+    });
+    let watches = watches.await;
+    assert_eq!((searches.len(), watches.len()), (6, 6), "three quarters");
+    let watching = server
+        .objects()
+        .await
+        .watch_objects(v1::WatchObjectsRequest::default())
+        .await;
+    watching.expect("there is a place for another client");
+    for _ in 0..5 {
+        let answer = find(&server, floating_remote()).await;
+        assert_eq!(answer.outcome(), v1::Outcome::Found);
+    }
+    // All six still search.
+    assert_eq!(server.gauges().searches(), 6);
 }
 
 #[tokio::test(flavor = "multi_thread")]

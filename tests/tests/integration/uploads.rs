@@ -190,7 +190,7 @@ async fn a_stalled_upload_ends() {
 #[tokio::test(flavor = "multi_thread")]
 async fn uploads_share_permits_and_bytes_until_they_end() {
     let server = TestServer::start_with(|config| {
-        config.maximum_uploads = 2.try_into().unwrap();
+        config.maximum_uploads = 3.try_into().unwrap();
         config.streams.upload_bytes = (1 << 20).try_into().unwrap();
     })
     .await;
@@ -205,7 +205,7 @@ async fn uploads_share_permits_and_bytes_until_they_end() {
             }
         }
     };
-    let begun = vec![begin(box_request("other"), 700 << 10)];
+    let begun = vec![begin(box_request("other"), 900 << 10)];
     let status = bounded("a refusal", refusal(begun)).await;
     assert_status(&status, Code::ResourceExhausted, "TOO_MANY_UPLOAD_BYTES");
     let (_second, _second_call) = unfinished(&server, "second", 100 << 10).await;

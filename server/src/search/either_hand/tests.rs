@@ -20,6 +20,7 @@ use grasp_synthesis::{
 };
 
 use super::*;
+use crate::executor::Workers;
 use crate::search::slices::{Progress, tests::ReadingsClock};
 
 /// Longest search, by its clock; reached only if something hangs.
@@ -69,7 +70,7 @@ fn either_of(built_in: &BuiltInHoldout, settings: [&SearchSettings; 2], patience
     let [right, left] = [Handedness::Right, Handedness::Left].map(|side| task(built_in, &holdout, side));
     let (pool, progress) = (pool(settings[0].run.workers), Progress::default());
     let site = Site {
-        pool: &pool,
+        workers: Workers::alone(&pool),
         clock: &ReadingsClock::default(),
         stop: Stop::NEVER,
         progress: &progress,

@@ -158,7 +158,7 @@ fn assert_not_found(status: &Status) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_deleted_track_is_gone_and_others_cannot_be_guessed() {
-    let server = TestServer::start_with(|config| config.streams.tracks = 2.try_into().unwrap()).await;
+    let server = TestServer::start_with(|config| config.streams.tracks = 3.try_into().unwrap()).await;
     let track = Created::remote(&server).await;
     let other = Created::remote(&server).await;
     assert_ne!(track.name, other.name);
