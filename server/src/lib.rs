@@ -16,11 +16,11 @@
 //! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
 //! contents.
 //!
-//! `metrics` counts calls and searches, by the `methods` of the services, `traces` are their spans, and `monitor` answers operators and probes on a port of its
-//! own. `warning_rate` bounds warnings that clients can cause, and `log_lines` escapes what they send.
+//! `metrics` counts calls and searches, by the `methods` of the services, `traces` are their spans, and `monitor` answers operators
+//! and probes on a port of its own. `warning_rate` bounds warnings that clients can cause, and `log_lines` escapes what they send.
 //!
-//! Before serving, `memory` compares the configured limits with those of the process, and `objects::directory` loads the folder
-//! of objects. Between calls, `atlases` builds atlases in the background.
+//! Before serving, `memory` and `open_files` compare the configured limits with those of the process, and `objects::directory` loads
+//! the folder of objects. Between calls, `atlases` builds atlases in the background.
 //! `health_check` is a client: it asks a running server for its health.
 //!
 //! # Order of modules
@@ -33,7 +33,7 @@
 //! atlas_slots  executor  health_check  net  saved  web
 //! rigs
 //! answer  call  config  validate
-//! connect  memory  objects  track
+//! connect  memory  objects  open_files  track
 //! atlases
 //! search
 //! services
@@ -67,6 +67,7 @@ mod middleware;
 mod monitor;
 mod net;
 mod objects;
+mod open_files;
 mod rigs;
 mod saved;
 mod search;
@@ -88,6 +89,7 @@ pub use listen::{ListenAddress, Listener};
 pub use log_lines::LogLines;
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
+pub use open_files::fit_open_files;
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};
 pub use web::WebOrigins;

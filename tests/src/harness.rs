@@ -1,6 +1,6 @@
 //! A server inside the test, on its own port, and values of the core as its messages.
 
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 
 use grasp_client::GraspClient;
 use grasp_proto::v1::{
@@ -24,8 +24,6 @@ const WORKERS: usize = 2;
 #[derive(Debug)]
 pub struct TestServer {
     address: SocketAddr,
-    /// Where it also listens.
-    second: SocketAddr,
     monitor: SocketAddr,
     gauges: Gauges,
     stop: DropGuard,
@@ -40,6 +38,11 @@ impl TestServer {
 
     /// Starts a server whose configuration `adapt` changes.
     pub async fn start_with(adapt: impl FnOnce(&mut Config)) -> Self {
+        Self::start_on(Ipv6Addr::LOCALHOST.into(), adapt).await
+    }
+
+    /// Starts a server on another address of this machine.
+    pub async fn start_on(address: IpAddr, adapt: impl FnOnce(&mut Config)) -> Self {
         let mut config = Config {
             workers: WORKERS.try_into().expect("there are workers"),
             builder_threads: 0,
@@ -47,18 +50,15 @@ impl TestServer {
             ..Config::default()
         };
         adapt(&mut config);
-        let (listener, address) = listen(Ipv6Addr::LOCALHOST).await;
-        let (also, second) = listen(Ipv4Addr::LOCALHOST).await;
-        let (monitor_listener, monitor) = listen(Ipv6Addr::LOCALHOST).await;
+        let (listener, address) = listen(address).await;
+        let (monitor_listener, monitor) = listen(Ipv6Addr::LOCALHOST.into()).await;
         let server = Server::new(config).expect("the server starts");
         let server = server.monitored_on(monitor_listener.into());
         let gauges = server.gauges();
         let stop = CancellationToken::new();
-        let serving =
-            tokio::spawn(server.serve([listener.into(), also.into()], stop.clone().cancelled_owned()));
+        let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));
         Self {
             address,
-            second,
             monitor,
             gauges,
             stop: stop.drop_guard(),
@@ -97,11 +97,12 @@ impl TestServer {
             .expect("the server accepts connections")
     }
 
-    /// A connection of another client: it comes from another address.
-    pub async fn other_channel(&self) -> Channel {
-        let endpoint = Endpoint::from_shared(format!("http://{}", self.second));
+    /// A connection from another address of this machine, which counts for another client.
+    pub async fn channel_from(&self, address: IpAddr) -> Channel {
+        let endpoint = Endpoint::from_shared(self.endpoint());
         let endpoint = endpoint.expect("an address is a valid endpoint");
-        endpoint.connect().await.expect("the server accepts connections")
+        let connecting = endpoint.local_address(Some(address)).connect();
+        connecting.await.expect("the server accepts connections")
     }
 
     /// The project's own client, on a new connection.
@@ -176,9 +177,9 @@ impl StoppingServer {
     }
 }
 
-async fn listen(interface: impl Into<IpAddr>) -> (TcpListener, SocketAddr) {
-    let listener = TcpListener::bind((interface.into(), 0)).await;
-    let listener = listener.expect("a free port of the loopback interface");
+async fn listen(interface: IpAddr) -> (TcpListener, SocketAddr) {
+    let listener = TcpListener::bind((interface, 0)).await;
+    let listener = listener.expect("a free port of this machine");
     let address = listener.local_addr().expect("a bound socket has an address");
     (listener, address)
 }

@@ -57,9 +57,8 @@ const AWAITED_STREAMS: [&str; 3] = [
     "/grasp.v1.ObjectService/WatchObjects",
 ];
 
-/// How long before its deadline an unanswered call ends. At the deadline the transport would end it, without the framing and the
-/// headers that pages need.
-const BEFORE_TRANSPORT: Duration = Duration::from_millis(1);
+/// How long before its deadline an unanswered call ends, so that its client may still learn why.
+const BEFORE_END: Duration = Duration::from_millis(1);
 
 /// True if a method takes large messages, once its call is admitted.
 pub(crate) fn is_upload(path: &str) -> bool {
@@ -113,7 +112,7 @@ impl Calls {
 
     /// When and with which error an unanswered call ends.
     fn end(&self, path: &str, context: &CallContext) -> Option<(Instant, ServiceError)> {
-        let before = |deadline: Instant| deadline.checked_sub(BEFORE_TRANSPORT).unwrap_or(deadline);
+        let before = |deadline: Instant| deadline.checked_sub(BEFORE_END).unwrap_or(deadline);
         let due = context
             .deadline
             .map(|deadline| (before(deadline), ServiceError::DeadlineExceeded));

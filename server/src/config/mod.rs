@@ -78,8 +78,12 @@ pub struct Config {
     pub learned_grips: usize,
     /// Folder that keeps atlases. `None` for that of [`Self::kept_atlases`].
     pub atlas_directory: Option<PathBuf>,
-    /// Largest number of connections; others wait.
+    /// Largest number of connections; others are closed, or take the place of one without a call.
     pub maximum_connections: NonZeroUsize,
+    /// Longest time without a call on a connection.
+    pub connection_idle: Duration,
+    /// Age from which a connection takes no more calls, give or take a tenth.
+    pub connection_age: Duration,
     /// Largest number of bytes of answers that wait for clients to read them; beyond, the connection with the most is closed.
     pub maximum_unread_bytes: NonZeroUsize,
     /// Origins of the pages that may call from browsers.
@@ -141,6 +145,8 @@ impl Default for Config {
             learned_grips: 32,
             atlas_directory: None,
             maximum_connections: non_zero(1000),
+            connection_idle: Duration::from_mins(5),
+            connection_age: Duration::from_mins(30),
             maximum_unread_bytes: non_zero(32 << 20),
             web_origins: WebOrigins::LOOPBACK,
             viewer: false,

@@ -40,14 +40,17 @@ impl Monitor {
                 "connections",
                 "Open connections",
                 (
-                    shared.unread.connections(),
+                    shared.connections.count(),
                     shared.config.maximum_connections.get(),
                 ),
             ),
             (
                 "unread_bytes",
                 "Bytes of answers that wait for clients, and of unanswered requests",
-                (shared.unread.bytes(), shared.config.maximum_unread_bytes.get()),
+                (
+                    shared.connections.unread_bytes(),
+                    shared.config.maximum_unread_bytes.get(),
+                ),
             ),
         ] {
             page.gauge(&format!("grasp_{name}"), &format!("{help}."), taken);
@@ -66,8 +69,8 @@ impl Monitor {
         );
         page.counters(
             "grasp_closed_connections_total",
-            "Connections closed because their clients read or send too slowly, by the reason.",
-            &shared.unread.closings,
+            "Connections that the server closed, by the reason.",
+            &shared.connections.closings,
         );
         let is_reachable = u8::from(self.vitals.is_store_reachable());
         page.gauge(

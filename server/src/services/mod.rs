@@ -33,7 +33,7 @@ use crate::{
     executor::{SearchExecutor, before, run_blocking, run_stoppable},
     limits::{ClientPermits, Places},
     metrics::Metrics,
-    net::UnreadAnswers,
+    net::Connections,
     objects::{
         Derived, Revision, StoredObject,
         derived::Resizer,
@@ -68,7 +68,7 @@ pub(crate) struct Shared {
     /// Has a receiver per call in flight.
     pub calls: watch::Sender<()>,
     /// Answers that wait for clients to read them.
-    pub unread: Arc<UnreadAnswers>,
+    pub connections: Arc<Connections>,
     /// Cancelled when the server begins to shut down, which ends streams without an end of their own.
     pub shutdown: CancellationToken,
     /// One permit per object that may be prepared for searches at a time.
