@@ -102,6 +102,11 @@ impl RigStore {
         self.scaled.get(hand, hundredths)
     }
 
+    /// Number of created rigs, with damaged ones.
+    pub(crate) fn count(&self) -> usize {
+        self.created().len()
+    }
+
     /// Checks that a rig can be added: called before a rig is made, so that none is made in vain.
     pub(crate) fn check_room(&self, id: &str) -> Result<(), ServiceError> {
         if self.built_in.contains_key(id) || self.created().contains_key(id) {

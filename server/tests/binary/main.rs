@@ -5,6 +5,7 @@ mod bombs;
 mod forged;
 mod growth;
 mod kills;
+mod log;
 mod stress;
 
 use std::{
@@ -82,7 +83,11 @@ impl Running {
                 read > 0,
                 "the server ended before it logged its address: {start_log}"
             );
-            if let Some((_, rest)) = start_log[start..].split_once("address=") {
+            // In JSON or as text.
+            let line = start_log[start..]
+                .replace("\"address\":\"", "address=")
+                .replace('"', " ");
+            if let Some((_, rest)) = line.split_once("address=") {
                 break rest.split_whitespace().next().expect("it follows").to_owned();
             }
         };
@@ -296,6 +301,20 @@ fn every_signal_to_end_drains_even_when_nobody_reads_the_log() {
     // As with a closed terminal.
     server.log = None;
     server.end_by("QUIT");
+}
+
+#[test]
+fn a_second_signal_ends_the_server_at_once() {
+    let variables = [
+        ("GRASP_LISTEN", "127.0.0.1:0"),
+        ("GRASP_DRAIN_DELAY_MS", "600000"),
+    ];
+    let mut server = Running::start(&variables);
+    server.signal("TERM");
+    server.read_until("draining");
+    server.signal("INT");
+    let status = server.child.wait().expect("it is a child");
+    assert_eq!(status.code(), Some(1));
 }
 
 #[test]
