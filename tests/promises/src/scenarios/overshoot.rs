@@ -20,7 +20,7 @@ const DEADLINES_MS: [u64; 2] = [20, 200];
 
 pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let server = bench.server(NO_ATLASES)?;
-    let channel = connect(server.address, LIGHT, 1).await?[0].clone();
+    let channel = connect(server.address, LIGHT).await?;
     let hopeless = impossible(&channel, Duration::from_secs(10)).await?;
     let mut connection = Connection::over(socket(server.address, LIGHT).await?, WINDOW).await?;
     let [shortest, longest] = DEADLINES_MS;
