@@ -1,6 +1,7 @@
-//! Shared by integration tests, benches and promises: a server inside the process, a client by hand, recorded hands, placed
+//! Shared by integration tests, benches and promises: a server inside the process, a client by hand, attacks, recorded hands, placed
 //! givers, and random holdouts.
 
+pub mod attacks;
 mod harness;
 pub mod random_holdouts;
 pub mod raw;

@@ -1,6 +1,7 @@
 //! The binary: exit codes, messages, signals, health checks, and memory limits.
 #![cfg(target_os = "linux")]
 
+mod bombs;
 mod stress;
 
 use std::{

@@ -1,5 +1,6 @@
 //! The scenarios, each in a file.
 
+mod attacks;
 mod cancel;
 mod capacity;
 mod fairness;
@@ -31,6 +32,8 @@ pub(crate) enum Scenario {
     Fairness,
     /// Health checks of an overloaded server.
     Health,
+    /// Another client beside floods of frames, and beside idle and slow connections.
+    Attacks,
     /// Clients that try refused calls again at once.
     Storm,
     /// Processor time and memory, for planning.
@@ -47,6 +50,7 @@ pub(crate) async fn measure(bench: &Bench, scenario: Scenario) -> Result<Vec<Row
         Scenario::Cancel => cancel::measure(bench).await,
         Scenario::Fairness => fairness::measure(bench).await,
         Scenario::Health => health::measure(bench).await,
+        Scenario::Attacks => attacks::measure(bench).await,
         Scenario::Storm => storm::measure(bench).await,
         Scenario::Capacity => capacity::measure(bench).await,
     }
