@@ -123,19 +123,31 @@ impl Bench {
             let server = self.server(NO_ATLASES)?;
             self.step("saturation");
             let call = find_grasp(server.address, LIGHT, &self.requests.searching).await?;
-            Ok::<_, Failure>(self.saturate(call, Placement::Apart).await.goodput())
+            Ok::<_, Failure>(self.saturate(call, Placement::Apart).await?.goodput())
         });
         saturation.await.copied()
     }
 
     /// Keeps a server just busy with calls.
-    pub(crate) async fn saturate(&self, call: Call, placement: Placement) -> Tally {
+    ///
+    /// # Errors
+    /// It serves none.
+    pub(crate) async fn saturate(&self, call: Call, placement: Placement) -> Result<Tally, Failure> {
         let at_a_time = BUSY
             * match placement {
                 Placement::Apart => self.split.server.count(),
                 Placement::Together => self.split.all.count(),
             };
-        closed_loop(call, at_a_time, self.seconds(20, 3)).await
+        let tally = closed_loop(call, at_a_time, self.seconds(20, 3)).await;
+        if tally.goodput() > 0.0 {
+            Ok(tally)
+        } else {
+            Err(format!(
+                "the server serves none of {at_a_time} calls at a time: {}",
+                tally.summary()
+            )
+            .into())
+        }
     }
 }
 

@@ -122,7 +122,7 @@ async fn curve(
     let server = bench.server_at(placement, flags)?;
     let call = find_grasp(server.address, LIGHT, requests).await?;
     bench.step("saturation");
-    let saturated = bench.saturate(call.clone(), placement).await;
+    let saturated = bench.saturate(call.clone(), placement).await?;
     let mut at_multiples = Vec::new();
     for &multiple in multiples {
         bench.step(format_args!("goodput at {multiple} ×"));

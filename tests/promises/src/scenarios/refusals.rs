@@ -27,7 +27,7 @@ pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let call = find_grasp(server.address, LIGHT, &bench.requests.searching).await?;
     bench.step("cost of served calls");
     let before = server.usage()?;
-    let saturated = bench.saturate(call.clone(), Placement::Apart).await;
+    let saturated = bench.saturate(call.clone(), Placement::Apart).await?;
     let served = saturated.count(|end| matches!(end, End::Served | End::Unfound)) as f64;
     let cost_served = server.spent_since(&before)?.total() / served;
     bench.step("refusals at 10 ×");

@@ -17,7 +17,7 @@ pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let server = bench.server(NO_ATLASES)?;
     let call = find_grasp(server.address, LIGHT, &bench.requests.searching).await?;
     bench.step("saturation");
-    let saturated = bench.saturate(call.clone(), Placement::Apart).await.goodput();
+    let saturated = bench.saturate(call.clone(), Placement::Apart).await?.goodput();
     bench.step("retry storm at 2 ×");
     let tally = open_loop(call, 2.0 * saturated, bench.seconds(30, 3), TRIES).await;
     Ok(vec![Row::at_least(
