@@ -26,6 +26,7 @@ use tonic_web::GrpcWebLayer;
 use tower::{ServiceBuilder, util::option_layer};
 
 use crate::{
+    access::Door,
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
     call::{BySize, Calls},
@@ -33,6 +34,7 @@ use crate::{
     connect::{Connect, Transcoding},
     error::Limit,
     executor::SearchExecutor,
+    faults::FaultPoint,
     limits::{BYTES_BESIDES_MESH, ClientPermits, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
     listen::Listener,
     middleware::Around,
@@ -43,9 +45,11 @@ use crate::{
         saved::SavedObjects,
         store::ObjectStore,
     },
+    reload::{Reloader, Watched, keep_current},
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
+    tls::Tls,
     track::OpenTracks,
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
@@ -80,6 +84,9 @@ pub enum ServeError {
         /// The cause.
         source: std::io::Error,
     },
+    /// Files of certificates or tokens cannot be used.
+    #[error("{}", .0.join("\n"))]
+    Secrets(Vec<String>),
     /// The builder threads cannot be started.
     #[error("cannot start the atlas builders: {0}")]
     Builders(std::io::Error),
@@ -92,7 +99,12 @@ pub enum ServeError {
 #[derive(Debug)]
 pub struct Server {
     handler: Handler,
+    /// `None` if nothing is saved.
+    files: Option<Arc<SavedFiles>>,
     builds: Places,
+    tls: Option<Arc<Tls>>,
+    door: Arc<Door>,
+    reloader: Reloader,
 }
 
 /// The server's activity, for tests and monitoring.
@@ -150,6 +162,18 @@ impl Server {
     /// # Errors
     /// See [`ServeError`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
+        let tls = config.tls.clone().map(Tls::open).transpose();
+        let takes_certificates = config.tls.as_ref().is_some_and(|tls| tls.client_ca.is_some());
+        let door = Door::open(config.tokens_file.clone(), takes_certificates);
+        let (tls, door) = match (tls, door) {
+            (Ok(tls), Ok(door)) => (tls.map(Arc::new), Arc::new(door)),
+            (tls, door) => {
+                let problems = [tls.err(), door.err()];
+                return Err(ServeError::Secrets(
+                    problems.into_iter().flatten().flatten().collect(),
+                ));
+            }
+        };
         prepare_hands();
         let directory = match &config.objects_directory {
             Some(path) => {
@@ -174,11 +198,13 @@ impl Server {
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let atlas_files = match config.kept_atlases() {
             Some(path) => {
-                let opened = AtlasFiles::open(path.clone(), config.atlas_directory.is_none());
+                let opened = AtlasFiles::open(path.clone());
                 Some(opened.map_err(|source| ServeError::AtlasDirectory { path, source })?)
             }
             None => None,
         };
+        let models = config.maximum_object_bytes.get();
+        let rig_records = files.clone().map(|files| saved_rigs(files, models));
         let builds = Places::new(Limit::Uploads, config.maximum_uploads.get(), RETRY_UPLOAD_AFTER);
         let shared = Shared {
             atlases: Atlases::start(
@@ -190,7 +216,7 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
+            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), rig_records)),
             resizer: Resizer(Arc::new(Semaphore::new(config.derivations()))),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
@@ -200,6 +226,7 @@ impl Server {
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),
             heavy: Arc::new(ClientPermits::new(config.heavy_work())),
+            examining: ClientPermits::new(config.workers.get()),
             ahead: Semaphore::new(1),
             created: AtomicU64::new(0),
             upload_bytes: upload_places(config.streams.upload_bytes.get()),
@@ -215,7 +242,11 @@ impl Server {
         };
         Ok(Self {
             handler: Handler(Arc::new(shared)),
+            files,
             builds,
+            tls,
+            door,
+            reloader: Reloader::default(),
         })
     }
 
@@ -227,6 +258,9 @@ impl Server {
             config,
             ..
         } = &*self.handler;
+        if let Some(files) = &self.files {
+            files.own().await?;
+        }
         let objects = objects.read_saved().await?;
         let rigs = load_saved_rigs(rigs, config.mesh_limits(config.maximum_object_bytes)).await?;
         let (store, milliseconds) = (&config.place, start.elapsed().as_millis());
@@ -238,9 +272,20 @@ impl Server {
         Ok(())
     }
 
+    /// Calls a closure at the points where tests inject faults.
+    #[doc(hidden)]
+    pub fn inject_faults(&self, hook: impl Fn(FaultPoint) + Send + Sync + 'static) {
+        self.handler.executor.faults.set(Box::new(hook));
+    }
+
     /// The server's activity.
     pub fn gauges(&self) -> Gauges {
         Gauges(self.handler.clone())
+    }
+
+    /// Makes the server read its certificates and tokens again.
+    pub fn reloader(&self) -> Reloader {
+        self.reloader.clone()
     }
 
     /// Serves on one or more listeners, which share all limits; see [`run`].
@@ -275,8 +320,20 @@ impl Server {
         listeners: Vec<Listener>,
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
-        self.read_saved().await?;
-        let Self { handler, builds } = self;
+        if let Err(error) = self.read_saved().await {
+            if let Some(files) = &self.files {
+                files.give_back().await;
+            }
+            return Err(error.into());
+        }
+        let Self {
+            handler,
+            files,
+            builds,
+            tls,
+            door,
+            reloader,
+        } = self;
         let config = &handler.config;
         let largest_upload = largest_upload(config);
         let grasps = GraspServiceServer::new(handler.clone())
@@ -319,7 +376,7 @@ impl Server {
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(Around(calls(&handler, builds, &packers)))
+            .layer(Around(calls(&handler, Arc::clone(&door), builds, &packers)))
             .layer(Around(Transcoding {
                 largest_upload,
                 places: packers,
@@ -327,6 +384,7 @@ impl Server {
             .service(routes.prepare());
         let serving = Serving {
             service,
+            tls: tls.clone(),
             lifetime: Lifetime {
                 idle: config.connection_idle,
                 age: config.connection_age,
@@ -340,6 +398,8 @@ impl Server {
         let _builders_end = handler.atlases.stopper();
         let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
+        let mut watched = vec![Watched::new(door)];
+        watched.extend(tls.map(|tls| Watched::new(tls)));
         let shutting_down = async {
             shutdown.await;
             tracing::info!(calls = handler.calls.receiver_count(), "draining");
@@ -356,10 +416,21 @@ impl Server {
             close.cancel();
             std::future::pending::<()>().await;
         };
+        let lost = async {
+            match &files {
+                Some(files) => files.lost().await,
+                None => std::future::pending().await,
+            }
+        };
         tokio::select! {
             () = serving => {}
             () = handler.connections.close_stalled() => {}
+            () = keep_current(watched, reloader) => {}
+            lost = lost => return Err(lost.into()),
             () = shutting_down => {}
+        }
+        if let Some(files) = &files {
+            files.give_back().await;
         }
         tracing::info!("stopped");
         Ok(())
@@ -403,9 +474,10 @@ fn largest_upload(config: &Config) -> usize {
     config.maximum_object_bytes.get() + BYTES_BESIDES_MESH
 }
 
-fn calls(handler: &Handler, builds: Places, packers: &Arc<Semaphore>) -> Calls {
+fn calls(handler: &Handler, door: Arc<Door>, builds: Places, packers: &Arc<Semaphore>) -> Calls {
     let config = &handler.config;
     Calls {
+        door,
         in_flight: handler.calls.clone(),
         executor: handler.executor.clone(),
         longest_search: config.budgets.maximum,

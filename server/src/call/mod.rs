@@ -5,6 +5,7 @@
 
 mod layer;
 mod packing;
+mod panics;
 mod reads;
 mod upload;
 
@@ -24,6 +25,7 @@ pub(crate) use self::{
     upload::UploadPermit,
 };
 use crate::{
+    access::Caller,
     budget::DeadlineReserve,
     client::Client,
     executor::Admission,
@@ -41,6 +43,7 @@ pub(crate) struct CallContext {
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
     pub client: Client,
+    pub caller: Caller,
     record: Arc<CallRecord>,
 }
 
@@ -80,6 +83,7 @@ impl CallContext {
             arrived,
             deadline: self.deadline,
             client: self.client.clone(),
+            caller: self.caller.clone(),
             record: Arc::default(),
         }
     }
@@ -91,8 +95,17 @@ impl CallContext {
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
             client,
+            caller: Caller::default(),
             record: Arc::default(),
         }
+    }
+
+    /// Makes it the call of a client that a token or certificate names.
+    fn identify(&mut self, caller: Caller) {
+        if let Some(name) = caller.name() {
+            self.client = Client::Named(Arc::clone(name));
+        }
+        self.caller = caller;
     }
 
     /// The right to search that the call came with. Parts of a call have none.

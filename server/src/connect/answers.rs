@@ -18,7 +18,10 @@ use super::{
     errors::{ErrorBody, http_status},
     messages::{PACKED, PREFIX},
 };
-use crate::middleware::{FrameFilter, PolledFrame, filtered, next_frame};
+use crate::{
+    error::CHALLENGE,
+    middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+};
 
 /// Flag of the envelope that ends a stream.
 const END: u8 = 2;
@@ -81,7 +84,10 @@ pub(super) fn failure(status: &Status, format: Format) -> Response<Body> {
 /// An error that is no message of a stream, with a status of HTTP.
 pub(super) fn refusal(http: StatusCode, status: &Status) -> Response<Body> {
     let mut answer = whole(http, "application/json", json(&ErrorBody::from(status)).into());
-    let metadata = status.metadata().clone().into_headers();
+    let mut metadata = status.metadata().clone().into_headers();
+    if let Some(challenge) = metadata.remove(CHALLENGE) {
+        answer.headers_mut().insert(CHALLENGE, challenge);
+    }
     answer.headers_mut().extend(trailing(&metadata));
     answer
 }

@@ -1,5 +1,6 @@
 //! The server over real gRPC, in one binary that is linked once.
 
+mod access;
 mod atlases;
 mod attacks;
 mod connect;
@@ -15,10 +16,12 @@ mod module_order;
 mod network;
 mod objects;
 mod own_hands;
+mod panics;
 mod real_input;
 mod reported;
 mod saved;
 mod saved_by_0_1;
+mod secure;
 mod standard;
 mod streams;
 mod tracks;

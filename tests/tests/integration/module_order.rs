@@ -11,9 +11,26 @@ use std::{
 
 /// The server's top-level modules, as documented in its `lib.rs`.
 const SERVER: &[&[&str]] = &[
-    &["budget", "client", "convention", "error", "middleware", "wire"],
-    &["limits", "listen", "viewer"],
-    &["atlas_slots", "executor", "health_check", "net", "saved", "web"],
+    &[
+        "budget",
+        "client",
+        "convention",
+        "error",
+        "faults",
+        "middleware",
+        "reload",
+        "wire",
+    ],
+    &["limits", "listen", "tls", "viewer"],
+    &[
+        "access",
+        "atlas_slots",
+        "executor",
+        "health_check",
+        "net",
+        "saved",
+        "web",
+    ],
     &["rigs"],
     &["answer", "call", "config", "validate"],
     &["connect", "memory", "objects", "open_files", "track"],

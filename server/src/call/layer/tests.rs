@@ -67,6 +67,7 @@ impl Call {
 
 fn admitting_one() -> Calls {
     Calls {
+        door: Arc::new(Door::open(None, false).unwrap()),
         in_flight: watch::Sender::new(()),
         executor: SearchExecutor::new(1, 8).expect("a thread starts"),
         longest_search: Duration::from_secs(10),
