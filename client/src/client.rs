@@ -1,6 +1,7 @@
 //! The client: connection, deadlines, retries.
 
 use std::{
+    error::Error as _,
     future::Future,
     pin::Pin,
     time::{Duration, Instant},
@@ -146,7 +147,7 @@ fn open(
 pub struct GraspClient {
     channel: Channel,
     pub(crate) call_timeout: Duration,
-    retry: RetryPolicy,
+    pub(crate) retry: RetryPolicy,
 }
 
 impl GraspClient {
@@ -261,7 +262,7 @@ impl GraspClient {
             let result = tokio::time::timeout(remaining, send(self.channel.clone(), request)).await;
             let status = match result {
                 Ok(Ok(response)) => return Ok(response.into_inner()),
-                Ok(Err(status)) if !is_timeout(&status, start.elapsed() >= timeout) => status,
+                Ok(Err(status)) if !is_timeout(&status, start.elapsed() >= timeout) => of_transport(status),
                 Ok(Err(_)) | Err(_) => {
                     Status::deadline_exceeded(format!("{method} was not answered within {timeout:?}"))
                 }
@@ -275,6 +276,16 @@ impl GraspClient {
                 None => return Err(ClientError::from_status(&status, attempts)),
             }
         }
+    }
+}
+
+/// The status, or that of a lost connection: tonic has several codes for those, each with its cause. Every call may be sent again.
+pub(crate) fn of_transport(status: Status) -> Status {
+    match status.source() {
+        Some(cause) if status.code() != Code::Unavailable => {
+            Status::unavailable(format!("the connection was lost: {}: {cause}", status.message()))
+        }
+        _ => status,
     }
 }
 

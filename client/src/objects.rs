@@ -7,11 +7,11 @@ use grasp_proto::v1::{
     upload_object_request::Part,
 };
 use sha2::{Digest as _, Sha256};
-use tonic::{Request, Status};
+use tonic::{Request, Status, Streaming};
 use uuid::Uuid;
 
 use crate::{
-    client::GraspClient,
+    client::{GraspClient, of_transport},
     error::ClientError,
     streams::{MessageStream, ObjectWatch},
 };
@@ -171,33 +171,28 @@ impl GraspClient {
         .await
     }
 
-    /// An object's mesh as searches use it; `name` is "objects/{object}". The call timeout applies to each part.
+    /// An object's mesh as searches use it; `name` is "objects/{object}". The call timeout applies to each part; if the connection is
+    /// lost, all parts are requested again.
     ///
     /// # Errors
     /// Any except those of connecting; `NotFound` if the object does not exist.
     pub async fn get_mesh(&self, name: impl Into<String>) -> Result<ObjectMesh, ClientError> {
         let message = v1::GetMeshRequest { name: name.into() };
-        let mut parts = self
-            .call("GetMesh", None, &message, |channel, request| async move {
-                ObjectServiceClient::new(channel).get_mesh(request).await
-            })
-            .await?;
-        let mut mesh = ObjectMesh {
-            glb: Vec::new(),
-            etag: String::new(),
-        };
-        let limit = self.call_timeout;
-        let late = |_| Status::deadline_exceeded(format!("no part of the mesh came within {limit:?}"));
+        let mut attempts = 0;
         loop {
-            let part = tokio::time::timeout(limit, parts.message()).await;
-            let part = part.map_err(late).flatten();
-            match part.map_err(|status| ClientError::from_status(&status, 1))? {
-                None => return Ok(mesh),
-                Some(part) => {
-                    mesh.glb.extend(part.piece);
-                    // Only the first part has an etag.
-                    mesh.etag += &part.etag;
-                }
+            attempts += 1;
+            let parts = self
+                .call("GetMesh", None, &message, |channel, request| async move {
+                    ObjectServiceClient::new(channel).get_mesh(request).await
+                })
+                .await?;
+            let status = match mesh_of(parts, self.call_timeout).await {
+                Ok(mesh) => return Ok(mesh),
+                Err(status) => of_transport(status),
+            };
+            match self.retry.wait_after(attempts, &status) {
+                Some(wait) => tokio::time::sleep(wait).await,
+                None => return Err(ClientError::from_status(&status, attempts)),
             }
         }
     }
@@ -280,6 +275,25 @@ impl GraspClient {
         })
         .await
     }
+}
+
+/// The mesh of its parts, each of which comes within a time limit.
+async fn mesh_of(mut parts: Streaming<v1::GetMeshResponse>, limit: Duration) -> Result<ObjectMesh, Status> {
+    let late = |_| Status::deadline_exceeded(format!("no part of the mesh came within {limit:?}"));
+    let mut mesh = ObjectMesh {
+        glb: Vec::new(),
+        etag: String::new(),
+    };
+    while let Some(part) = tokio::time::timeout(limit, parts.message())
+        .await
+        .map_err(late)
+        .flatten()?
+    {
+        mesh.glb.extend(part.piece);
+        // Only the first part has an etag.
+        mesh.etag += &part.etag;
+    }
+    Ok(mesh)
 }
 
 /// The token of the page after that of `token`; `None` after the last page.

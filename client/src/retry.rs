@@ -1,6 +1,6 @@
-//! Retries: on UNAVAILABLE only, with exponential backoff, a bounded number of times, and within the call's deadline.
-//! The server may ask for a longer wait (`RetryInfo`), set the wait, or forbid a retry (trailer `grpc-retry-pushback-ms`,
-//! gRPC proposal A6).
+//! Retries: on UNAVAILABLE, and on RESOURCE_EXHAUSTED if the server asks for a wait; with exponential backoff, a bounded number of
+//! times, and within the call's deadline. The server may ask for a longer wait (`RetryInfo`), set the wait, or forbid a retry
+//! (trailer `grpc-retry-pushback-ms`, gRPC proposal A6).
 
 use std::{
     hash::{BuildHasher as _, RandomState},
@@ -41,7 +41,10 @@ impl RetryPolicy {
 
     /// The wait after attempt number `attempts`, which ended with `status`; `None` to give up.
     pub(crate) fn wait_after(&self, attempts: u32, status: &Status) -> Option<Duration> {
-        if status.code() != Code::Unavailable || attempts >= self.max_attempts {
+        if attempts >= self.max_attempts {
+            return None;
+        }
+        if !matches!(status.code(), Code::Unavailable | Code::ResourceExhausted) {
             return None;
         }
         if let Some(value) = status.metadata().get(PUSHBACK_TRAILER) {
@@ -51,6 +54,9 @@ impl RetryPolicy {
         }
         let details = status.get_error_details();
         let delay = details.retry_info().and_then(|info| info.retry_delay);
+        if status.code() == Code::ResourceExhausted && delay.is_none() {
+            return None;
+        }
         let backoff = self.backoff(attempts, random_fraction());
         Some(backoff.max(delay.unwrap_or_default()))
     }
@@ -108,13 +114,16 @@ mod tests {
     }
 
     #[test]
-    fn only_unavailable_is_retried_and_a_bounded_number_of_times() {
+    fn only_unavailable_and_busy_servers_are_retried_and_a_bounded_number_of_times() {
         let policy = RetryPolicy::default();
         for code in 0..=16 {
             let status = Status::new(Code::from(code), "");
             let again = policy.wait_after(1, &status).is_some();
             assert_eq!(again, code == 14, "code {code}");
         }
+        let busy = tonic_types::ErrorDetails::with_retry_info(Some(Duration::ZERO));
+        let busy = Status::with_error_details(Code::ResourceExhausted, "busy", busy);
+        assert!(policy.wait_after(1, &busy).is_some());
         let status = Status::unavailable("draining");
         assert!(policy.wait_after(3, &status).is_some());
         assert_eq!(policy.wait_after(4, &status), None);

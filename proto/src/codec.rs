@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use prost::{
-    Message,
+    Message, Name,
     bytes::{Buf as _, BufMut as _},
 };
 use tonic::{
@@ -11,8 +11,14 @@ use tonic::{
     codec::{Codec, DecodeBuf, Decoder, EncodeBuf, Encoder},
 };
 
+use crate::parts::{MAX_PARTS, has_too_many_parts};
+
+/// End of the names of requests.
+const REQUEST: &str = "Request";
+
 /// Encodes the same bytes as `tonic_prost::ProstCodec`, but from and into plain slices: prost accesses its buffer once
-/// per number, and with gRPC's buffers each access costs more than the number itself.
+/// per number, and with gRPC's buffers each access costs more than the number itself. Requests of more than [`MAX_PARTS`] parts are
+/// refused before they are decoded; answers come from a server that the client has chosen.
 #[derive(Debug)]
 pub struct SliceCodec<T, U>(PhantomData<(T, U)>);
 
@@ -25,7 +31,7 @@ impl<T, U> Default for SliceCodec<T, U> {
 impl<T, U> Codec for SliceCodec<T, U>
 where
     T: Message + 'static,
-    U: Message + Default + 'static,
+    U: Message + Name + Default + 'static,
 {
     type Encode = T;
     type Decode = U;
@@ -54,12 +60,16 @@ impl<T: Message, U> Encoder for SliceCodec<T, U> {
     }
 }
 
-impl<T, U: Message + Default> Decoder for SliceCodec<T, U> {
+impl<T, U: Message + Name + Default> Decoder for SliceCodec<T, U> {
     type Item = U;
     type Error = Status;
 
     fn decode(&mut self, buffer: &mut DecodeBuf<'_>) -> Result<Option<U>, Status> {
         let bytes = buffer.copy_to_bytes(buffer.remaining());
+        if U::NAME.ends_with(REQUEST) && has_too_many_parts::<U>(&bytes) {
+            let problem = format!("it has more than {MAX_PARTS} messages, texts and lists");
+            return Err(Status::internal(problem));
+        }
         // gRPC assigns INTERNAL to messages that cannot be decoded.
         let message = U::decode(&*bytes).map_err(|error| Status::internal(error.to_string()))?;
         Ok(Some(message))

@@ -5,10 +5,12 @@ pub mod codec;
 #[cfg(feature = "json")]
 pub mod json;
 mod packed;
+mod parts;
 mod requests;
 mod values;
 
 pub use packed::PackedGraspError;
+pub use parts::{MAX_PARTS, has_too_many_parts};
 pub use values::{JOINT_COUNT, std_duration, wire_duration};
 
 /// Messages, clients and servers of package `grasp.v1`.

@@ -16,8 +16,8 @@
 //! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
 //! contents.
 //!
-//! Before serving, `memory` compares the configured limits with those of the process, and `objects::directory` loads the folder
-//! of objects. Between calls, `atlases` builds atlases in the background.
+//! Before serving, `memory` and `open_files` compare the configured limits with those of the process, and `objects::directory` loads
+//! the folder of objects. Between calls, `atlases` builds atlases in the background.
 //! `health_check` is a client: it asks a running server for its health. `faults` are those that tests inject.
 //!
 //! # Order of modules
@@ -30,7 +30,7 @@
 //! atlas_slots  executor  health_check  net  saved  web
 //! rigs
 //! answer  call  config  validate
-//! connect  memory  objects  track
+//! connect  memory  objects  open_files  track
 //! atlases
 //! search
 //! services
@@ -60,6 +60,7 @@ mod memory;
 mod middleware;
 mod net;
 mod objects;
+mod open_files;
 mod rigs;
 mod saved;
 mod search;
@@ -80,6 +81,7 @@ pub use limits::{StoreLimits, StreamLimits};
 pub use listen::{ListenAddress, Listener};
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
+pub use open_files::fit_open_files;
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};
 pub use web::WebOrigins;

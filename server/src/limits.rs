@@ -1,10 +1,13 @@
 //! Bounds and locks that more than one module needs.
 
 use std::{
+    collections::HashMap,
     num::NonZeroUsize,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
     time::Duration,
 };
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::{
     client::Client,
@@ -94,7 +97,59 @@ impl Places {
     }
 }
 
+/// Permits of each client, so that those of one that has used up its own wait for each other only.
+#[derive(Debug)]
+pub(crate) struct ClientPermits {
+    each: usize,
+    /// The permits of clients that use or wait for some.
+    clients: Mutex<HashMap<Client, Weak<Semaphore>>>,
+}
+
+impl ClientPermits {
+    /// So many permits for each client.
+    pub(crate) fn new(each: usize) -> Self {
+        Self {
+            each,
+            clients: Mutex::default(),
+        }
+    }
+
+    /// A permit of a client, once it has one left.
+    pub(crate) async fn acquire(&self, client: &Client) -> Option<OwnedSemaphorePermit> {
+        let permits = {
+            let mut clients = locked(&self.clients);
+            let known = clients.get(client).and_then(Weak::upgrade);
+            known.unwrap_or_else(|| {
+                clients.retain(|_, permits| permits.strong_count() > 0);
+                let permits = Arc::new(Semaphore::new(self.each));
+                clients.insert(client.clone(), Arc::downgrade(&permits));
+                permits
+            })
+        };
+        // Nothing closes the semaphore.
+        permits.acquire_owned().await.ok()
+    }
+}
+
 /// The content of a mutex, even of a poisoned one: no code leaves half a change when it panics.
 pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use futures_util::FutureExt as _;
+
+    use super::*;
+
+    #[test]
+    fn a_client_waits_for_its_own_permits_only() {
+        let permits = ClientPermits::new(1);
+        let (one, other) = (Client::Local, Client::at([127, 0, 0, 1].into()));
+        let held = permits.acquire(&one).now_or_never().flatten();
+        assert!(held.is_some() && permits.acquire(&one).now_or_never().is_none());
+        assert!(permits.acquire(&other).now_or_never().is_some());
+        drop(held);
+        assert!(permits.acquire(&one).now_or_never().flatten().is_some());
+    }
 }

@@ -14,7 +14,7 @@ use futures_util::future::select_all;
 use grasp_server::{
     Config, ListenAddress, Listener, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
-    is_reserved_memory_limited, warn_of_memory,
+    fit_open_files, is_reserved_memory_limited, warn_of_memory,
 };
 use rustix::fs::Mode;
 use tokio::signal::unix::{SignalKind, signal};
@@ -82,7 +82,7 @@ fn start(mut flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
         Some(path) => read_file(path)?,
         None => RawConfig::default(),
     };
-    let config = flags.values.complete(file)?;
+    let mut config = flags.values.complete(file)?;
     if flags.print_config {
         print!("{}", toml::to_string(&flags.values)?);
         return Ok(ExitCode::SUCCESS);
@@ -101,6 +101,7 @@ fn start(mut flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
     if let Err(error) = arenas {
         tracing::warn!(%error, "cannot start again with fewer arenas: allocations may fail below the limit of reserved memory");
     }
+    fit_open_files(&mut config);
     let json = config.log_format == LogFormat::Json;
     match run(&config) {
         Ok(()) => Ok(ExitCode::SUCCESS),

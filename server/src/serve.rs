@@ -20,10 +20,10 @@ use tokio::{
     sync::{Semaphore, watch},
 };
 use tokio_util::sync::CancellationToken;
-use tonic::{codec::CompressionEncoding::Gzip, server::NamedService, transport};
+use tonic::{codec::CompressionEncoding::Gzip, server::NamedService, service::Routes};
 use tonic_health::{ServingStatus, server::HealthReporter};
 use tonic_web::GrpcWebLayer;
-use tower::util::option_layer;
+use tower::{ServiceBuilder, util::option_layer};
 
 use crate::{
     atlases::{Atlases, files::AtlasFiles},
@@ -34,10 +34,10 @@ use crate::{
     error::Limit,
     executor::SearchExecutor,
     faults::FaultPoint,
-    limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
+    limits::{BYTES_BESIDES_MESH, ClientPermits, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
     listen::Listener,
     middleware::Around,
-    net::{MAX_HEADERS, UnreadAnswers, UnreadCount, accept},
+    net::{Connections, Lifetime, Serving, UnreadCount, accept},
     objects::{
         derived::Resizer,
         directory::{self, DirectoryError, PinnedObject},
@@ -51,27 +51,6 @@ use crate::{
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
 };
-
-/// Largest number of open streams per connection.
-const STREAMS_PER_CONNECTION: u32 = 100;
-
-/// Largest number of streams that a client may open and reset before its connection is closed as an attack.
-const PENDING_RESETS: usize = 20;
-
-/// Flow-control window of a stream, in bytes.
-const STREAM_WINDOW: u32 = 256 << 10;
-
-/// Flow-control window of a connection, in bytes.
-const CONNECTION_WINDOW: u32 = 1 << 20;
-
-/// Largest HTTP/2 frame, in bytes.
-const MAX_FRAME: u32 = 16 << 10;
-
-/// Interval of pings on a silent connection.
-const KEEPALIVE_EVERY: Duration = Duration::from_secs(30);
-
-/// Time limit for the answer to a ping.
-const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Time limit of a call beyond the largest budget: enough to read and build a large mesh.
 const CALL_TIME_BEYOND_BUDGET: Duration = Duration::from_secs(20);
@@ -108,9 +87,6 @@ pub enum ServeError {
     /// The descriptors of the contract are broken.
     #[error("cannot offer reflection: {0}")]
     Reflection(#[from] tonic_reflection::server::Error),
-    /// The transport failed.
-    #[error("the transport failed: {0}")]
-    Transport(#[from] transport::Error),
 }
 
 /// A server that is ready to listen.
@@ -149,7 +125,12 @@ impl Gauges {
 
     /// Bytes of answers that wait for clients to read them.
     pub fn unread_bytes(&self) -> usize {
-        self.0.unread.bytes()
+        self.0.connections.unread_bytes()
+    }
+
+    /// Number of open connections.
+    pub fn connections(&self) -> usize {
+        self.0.connections.count()
     }
 }
 
@@ -223,13 +204,17 @@ impl Server {
             )),
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),
+            heavy: Arc::new(ClientPermits::new(config.heavy_work())),
             ahead: Semaphore::new(1),
             created: AtomicU64::new(0),
             upload_bytes: upload_places(config.streams.upload_bytes.get()),
             watchers: watcher_places(config.streams.watchers.get()),
             tracks: Arc::new(OpenTracks::new(config.streams.tracks.get())),
             calls: watch::Sender::new(()),
-            unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
+            connections: Connections::new(
+                config.maximum_connections.get(),
+                config.maximum_unread_bytes.get(),
+            ),
             shutdown: CancellationToken::new(),
             config,
         };
@@ -341,27 +326,16 @@ impl Server {
 
         let stop = handler.shutdown.clone();
         let close = CancellationToken::new();
-        let incoming = accept(
-            listeners,
-            config.maximum_connections.get(),
-            Arc::clone(&handler.unread),
-            stop.clone(),
-            close.clone(),
-        );
         let origins = Arc::new(config.web_origins.clone());
         let is_web = *origins != WebOrigins::NONE;
         let packers = Arc::new(Semaphore::new(config.io_threads.get()));
-        let serving = transport::Server::builder()
-            // For Connect, and even without gRPC-Web, to tell its clients that it is off.
-            .accept_http1(true)
-            .max_concurrent_streams(STREAMS_PER_CONNECTION)
-            .http2_max_header_list_size(MAX_HEADERS as u32)
-            .http2_max_pending_accept_reset_streams(Some(PENDING_RESETS))
-            .initial_stream_window_size(STREAM_WINDOW)
-            .initial_connection_window_size(CONNECTION_WINDOW)
-            .max_frame_size(MAX_FRAME)
-            .http2_keepalive_interval(Some(KEEPALIVE_EVERY))
-            .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+        let routes = Routes::new(grasps)
+            .add_service(objects)
+            .add_service(rigs)
+            .add_service(health_service)
+            .add_service(reflection().build_v1()?)
+            .add_service(reflection().build_v1alpha()?);
+        let service = ServiceBuilder::new()
             .layer(Around(UnreadCount))
             .layer(refuse_origins(&origins))
             .layer(cors(&origins))
@@ -374,13 +348,17 @@ impl Server {
                 largest_upload,
                 places: packers,
             }))
-            .add_service(grasps)
-            .add_service(objects)
-            .add_service(rigs)
-            .add_service(health_service)
-            .add_service(reflection().build_v1()?)
-            .add_service(reflection().build_v1alpha()?)
-            .serve_with_incoming_shutdown(incoming, stop.clone().cancelled_owned());
+            .service(routes.prepare());
+        let serving = Serving {
+            service,
+            lifetime: Lifetime {
+                idle: config.connection_idle,
+                age: config.connection_age,
+                stop: stop.clone(),
+                close: close.clone(),
+            },
+        };
+        let serving = accept(listeners, Arc::clone(&handler.connections), serving, stop.clone());
 
         // Stops all tasks, however this function ends.
         let _builders_end = handler.atlases.stopper();
@@ -409,8 +387,8 @@ impl Server {
             }
         };
         tokio::select! {
-            served = serving => served?,
-            () = handler.unread.close_stalled() => {}
+            () = serving => {}
+            () = handler.connections.close_stalled() => {}
             lost = lost => return Err(lost.into()),
             () = shutting_down => {}
         }
@@ -466,6 +444,7 @@ fn calls(handler: &Handler, builds: Places, packers: &Arc<Semaphore>) -> Calls {
         executor: handler.executor.clone(),
         longest_search: config.budgets.maximum,
         uploads: builds,
+        heavy: Arc::clone(&handler.heavy),
         reads: Arc::default(),
         upload_grace: 2 * config.streams.upload_idle,
         packers: Arc::clone(packers),

@@ -1,6 +1,6 @@
 //! A server inside the test, on its own port, and values of the core as its messages.
 
-use std::net::{Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 
 use grasp_client::GraspClient;
 use grasp_proto::v1::{
@@ -33,11 +33,24 @@ impl TestServer {
 
     /// Starts a server whose configuration `adapt` changes.
     pub async fn start_with(adapt: impl FnOnce(&mut Config)) -> Self {
-        Self::start_faulty(adapt, |_| {}).await
+        Self::start_on(Ipv6Addr::LOCALHOST.into(), adapt).await
     }
 
-    /// The same with a hook that injects faults.
+    /// Starts a server on another address of this machine.
+    pub async fn start_on(address: IpAddr, adapt: impl FnOnce(&mut Config)) -> Self {
+        Self::begin(address, adapt, |_| {}).await
+    }
+
+    /// Starts a server with a hook that injects faults.
     pub async fn start_faulty(
+        adapt: impl FnOnce(&mut Config),
+        hook: impl Fn(FaultPoint) + Send + Sync + 'static,
+    ) -> Self {
+        Self::begin(Ipv6Addr::LOCALHOST.into(), adapt, hook).await
+    }
+
+    async fn begin(
+        address: IpAddr,
         adapt: impl FnOnce(&mut Config),
         hook: impl Fn(FaultPoint) + Send + Sync + 'static,
     ) -> Self {
@@ -48,9 +61,9 @@ impl TestServer {
             ..Config::default()
         };
         adapt(&mut config);
-        let listener = TcpListener::bind((Ipv6Addr::LOCALHOST, 0))
+        let listener = TcpListener::bind((address, 0))
             .await
-            .expect("a free port of the loopback interface");
+            .expect("a free port of this machine");
         let address = listener.local_addr().expect("a bound socket has an address");
         let server = Server::new(config).expect("the server starts");
         server.inject_faults(hook);
@@ -87,6 +100,14 @@ impl TestServer {
             .connect()
             .await
             .expect("the server accepts connections")
+    }
+
+    /// A connection from another address of this machine, which counts for another client.
+    pub async fn channel_from(&self, address: IpAddr) -> Channel {
+        let endpoint = Endpoint::from_shared(self.endpoint());
+        let endpoint = endpoint.expect("an address is a valid endpoint");
+        let connecting = endpoint.local_address(Some(address)).connect();
+        connecting.await.expect("the server accepts connections")
     }
 
     /// The project's own client, on a new connection.

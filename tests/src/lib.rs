@@ -1,8 +1,10 @@
-//! Shared by integration tests and benches: a server inside the process, recorded hands, placed givers, and random
-//! holdouts.
+//! Shared by integration tests, benches and promises: a server inside the process, a client by hand, attacks, recorded hands, placed
+//! givers, and random holdouts.
 
+pub mod attacks;
 mod harness;
 pub mod random_holdouts;
+pub mod raw;
 pub mod recorded;
 
 pub use harness::{StoppingServer, TestServer, wire_pose};

@@ -9,7 +9,7 @@ use std::{
 use crate::{
     Client,
     sync::{AtomicBool, Condvar, Mutex, Ordering, locked},
-    turns::{Ticket, Turns},
+    turns::{Cost, Ticket, Turns},
 };
 
 /// Admits jobs, and gives each its turns.
@@ -182,7 +182,12 @@ impl<C: Client> Drop for Job<C> {
         let mut state = locked(&self.gate.0);
         let State { turns, jobs } = &mut *state;
         if let Some(job) = jobs.remove(&self.number) {
-            turns.close(&job.ticket, job.is_done.then_some(job.cost));
+            let cost = match (job.ticket.due() <= Instant::now(), job.is_done) {
+                (true, _) => Cost::AtLeast(job.cost),
+                (false, true) => Cost::Whole(job.cost),
+                (false, false) => Cost::Unknown,
+            };
+            turns.close(&job.ticket, cost);
         }
         state.wake();
     }

@@ -55,6 +55,16 @@ impl Share {
     }
 }
 
+/// The turn time of a job that has ended.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Cost {
+    Whole(Duration),
+    /// It was cut short.
+    AtLeast(Duration),
+    /// It was not done.
+    Unknown,
+}
+
 /// A job that has not ended.
 #[derive(Clone, Debug)]
 pub(crate) struct Ticket<C> {
@@ -121,14 +131,18 @@ impl<C: Client> Turns<C> {
         }
     }
 
-    /// Ends a job that was done at a cost, or was not done.
-    pub(crate) fn close(&mut self, ticket: &Ticket<C>, cost: Option<Duration>) {
+    /// Ends a job, whose cost counts for the expectation of others.
+    pub(crate) fn close(&mut self, ticket: &Ticket<C>, cost: Cost) {
         self.leave(ticket);
         if let Some(share) = self.clients.get_mut(&ticket.client)
             && share.open.remove(&ticket.rank) == Some(true)
-            && let Some(cost) = cost
         {
-            self.mean_cost += NEWEST_WEIGHT * (cost.as_secs_f64() - self.mean_cost);
+            let cost = match cost {
+                Cost::Whole(cost) => cost.as_secs_f64(),
+                Cost::AtLeast(cost) => cost.as_secs_f64().max(self.mean_cost),
+                Cost::Unknown => self.mean_cost,
+            };
+            self.mean_cost += NEWEST_WEIGHT * (cost - self.mean_cost);
         }
         // An idle client is kept only while it has had more than a new one begins with.
         let now = self.now;
@@ -237,7 +251,7 @@ mod tests {
         for expected in [0, 1, 3, 2] {
             assert_eq!(begun(&mut turns, &tickets), [expected]);
             turns.end(&tickets[expected], SLICE);
-            turns.close(&tickets[expected], Some(SLICE));
+            turns.close(&tickets[expected], Cost::Whole(SLICE));
         }
         assert!(turns.is_idle());
     }
@@ -271,7 +285,7 @@ mod tests {
         let mut turns = Turns::new(1);
         for _ in 0..200 {
             let done = turns.open("a", start);
-            turns.close(&done, Some(SLICE));
+            turns.close(&done, Cost::Whole(SLICE));
         }
         let expected =
             |turns: &Turns<&str>, client, due| (turns.expected(&client, due).as_secs_f64() * 1e3).round();

@@ -15,7 +15,7 @@ use super::{
     CallContext, OpenCall,
     packing::{accepts_gzip, packing},
     panics::contained,
-    reads::{Reads, WaitingRead, is_read},
+    reads::{Reads, is_read},
     upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
 use crate::{
@@ -23,7 +23,7 @@ use crate::{
     client::Client,
     error::{ServiceError, blame_client},
     executor::SearchExecutor,
-    limits::{MAX_FIND_REQUEST, Places, locked},
+    limits::{ClientPermits, MAX_FIND_REQUEST, Place, Places, locked},
     middleware::{Answer, Middleware, filtered},
     net::{Reader, arriving},
 };
@@ -54,9 +54,8 @@ const AWAITED_STREAMS: [&str; 3] = [
     "/grasp.v1.ObjectService/WatchObjects",
 ];
 
-/// How long before its deadline an unanswered call ends. At the deadline the transport would end it, without the framing and the
-/// headers that pages need.
-const BEFORE_TRANSPORT: Duration = Duration::from_millis(1);
+/// How long before its deadline an unanswered call ends, so that its client may still learn why.
+const BEFORE_END: Duration = Duration::from_millis(1);
 
 /// True if a method takes large messages, once its call is admitted.
 pub(crate) fn is_upload(path: &str) -> bool {
@@ -74,6 +73,8 @@ pub(crate) struct Calls {
     pub longest_search: Duration,
     /// One place per concurrent upload.
     pub uploads: Places,
+    /// Permits of each client to build or prepare something.
+    pub heavy: Arc<ClientPermits>,
     /// Lets calls that read or delete take turns.
     pub reads: Arc<Reads>,
     /// Longest pause in an upload.
@@ -90,7 +91,7 @@ pub(crate) struct Calls {
 
 impl Calls {
     /// Admits a search, or a call that reads or deletes, which then waits for its turn.
-    fn admit(&self, path: &str, context: &CallContext) -> Result<Option<WaitingRead>, ServiceError> {
+    fn admit(&self, path: &str, context: &CallContext) -> Result<Option<Place>, ServiceError> {
         let client = &context.client;
         if SEARCH_METHODS.contains(&path) {
             let due = context.latest_end(self.longest_search);
@@ -102,7 +103,7 @@ impl Calls {
 
     /// When and with which error an unanswered call ends.
     fn end(&self, path: &str, context: &CallContext) -> Option<(Instant, ServiceError)> {
-        let before = |deadline: Instant| deadline.checked_sub(BEFORE_TRANSPORT).unwrap_or(deadline);
+        let before = |deadline: Instant| deadline.checked_sub(BEFORE_END).unwrap_or(deadline);
         let due = context
             .deadline
             .map(|deadline| (before(deadline), ServiceError::DeadlineExceeded));
@@ -141,13 +142,15 @@ impl Middleware<Body> for Calls {
             Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
         };
         let end = self.end(path, &context);
-        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads, context.client.clone()));
+        let upload =
+            is_upload(path).then(|| UploadPermit::new(&self.uploads, &self.heavy, context.client.clone()));
         // Beyond these bytes, an upload has a place and needs no other bound.
         let (largest, most_counted) = match upload {
             Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),
             None => (MAX_FIND_REQUEST, usize::MAX),
         };
         let packs = !AWAITED_STREAMS.contains(&path) && accepts_gzip(request.headers());
+        let client = context.client.clone();
         request.extensions_mut().insert(context);
         let (mut request, arriving) = arriving(request, most_counted);
         if let Some(permit) = upload {
@@ -156,10 +159,10 @@ impl Middleware<Body> for Calls {
             request = request.map(|body| bounded_upload(body, permit, grace));
         }
         let answer = contained(next(request), self.executor.faults.clone());
-        let packers = Arc::clone(&self.packers);
+        let (packers, reads) = (Arc::clone(&self.packers), Arc::clone(&self.reads));
         let answer = async move {
             let turn = match admitted {
-                Some(read) => Some(read.turn().await),
+                Some(entered) => Some(reads.turn(entered, &client).await),
                 None => None,
             };
             let answer = answer.await?;

@@ -3,20 +3,15 @@
 //! Each takes a little time on the threads that handle requests. Of one client only a few are handled at a time, and its others wait
 //! for them, so that those of another client come between.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, Weak},
-    task::Context,
-    time::Duration,
-};
+use std::{task::Context, time::Duration};
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::OwnedSemaphorePermit;
 use tonic::body::Body;
 
 use crate::{
     client::Client,
     error::{Limit, ServiceError},
-    limits::{Place, Places, locked},
+    limits::{ClientPermits, Place, Places},
     middleware::{FrameFilter, PolledFrame, next_frame},
 };
 
@@ -48,14 +43,7 @@ pub(super) fn is_read(path: &str) -> bool {
 #[derive(Debug)]
 pub(crate) struct Reads {
     places: Places,
-    /// Each client's permits, as long as it has calls.
-    clients: Mutex<HashMap<Client, Weak<Semaphore>>>,
-}
-
-/// A call that may wait for others of its client.
-pub(super) struct WaitingRead {
-    place: Place,
-    turns: Arc<Semaphore>,
+    turns: ClientPermits,
 }
 
 /// The right to handle a call, until the end of its answer.
@@ -68,31 +56,22 @@ impl Default for Reads {
     fn default() -> Self {
         Self {
             places: Places::new(Limit::Reads, MAX_READS, RETRY_AFTER),
-            clients: Mutex::default(),
+            turns: ClientPermits::new(MAX_AT_ONCE),
         }
     }
 }
 
 impl Reads {
-    pub(super) fn enter(&self, client: &Client) -> Result<WaitingRead, ServiceError> {
-        let place = self.places.take(client)?;
-        let mut clients = locked(&self.clients);
-        let turns = clients.get(client).and_then(Weak::upgrade).unwrap_or_else(|| {
-            clients.retain(|_, turns| turns.strong_count() > 0);
-            let turns = Arc::new(Semaphore::new(MAX_AT_ONCE));
-            clients.insert(client.clone(), Arc::downgrade(&turns));
-            turns
-        });
-        Ok(WaitingRead { place, turns })
+    /// Lets a client's call wait for its turn.
+    pub(super) fn enter(&self, client: &Client) -> Result<Place, ServiceError> {
+        self.places.take(client)
     }
-}
 
-impl WaitingRead {
-    pub(super) async fn turn(self) -> ReadTurn {
+    /// The turn of a call that has entered, once others of its client have ended.
+    pub(super) async fn turn(&self, entered: Place, client: &Client) -> ReadTurn {
         ReadTurn {
-            _place: self.place,
-            // Nothing closes the semaphore.
-            _turn: self.turns.acquire_owned().await.ok(),
+            _place: entered,
+            _turn: self.turns.acquire(client).await,
         }
     }
 }

@@ -11,13 +11,13 @@ use std::{
 };
 
 use bytes::Bytes;
-use tokio::time::Sleep;
+use tokio::{sync::OwnedSemaphorePermit, time::Sleep};
 use tonic::body::Body;
 
 use crate::{
     client::Client,
     error::ServiceError,
-    limits::{Place, Places, locked},
+    limits::{ClientPermits, Place, Places, locked},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
@@ -33,16 +33,21 @@ pub(crate) struct UploadPermit {
     places: Places,
     client: Client,
     taken: Arc<Mutex<Option<Place>>>,
+    /// Each client's permits for heavy work.
+    heavy: Arc<ClientPermits>,
+    turn: Arc<Mutex<Option<OwnedSemaphorePermit>>>,
     /// Why the request cannot be received to its end.
     failure: Arc<OnceLock<ServiceError>>,
 }
 
 impl UploadPermit {
-    pub(super) fn new(places: &Places, client: Client) -> Self {
+    pub(super) fn new(places: &Places, heavy: &Arc<ClientPermits>, client: Client) -> Self {
         Self {
             places: places.clone(),
             client,
             taken: Arc::default(),
+            heavy: Arc::clone(heavy),
+            turn: Arc::default(),
             failure: Arc::default(),
         }
     }
@@ -59,6 +64,14 @@ impl UploadPermit {
         if taken.is_none() {
             *taken = Some(self.places.take(&self.client)?);
         }
+        Ok(())
+    }
+
+    /// Takes a place, and waits until the client builds nothing else.
+    pub(crate) async fn take_turn(&self) -> Result<(), ServiceError> {
+        self.take_place()?;
+        let turn = self.heavy.acquire(&self.client).await;
+        *locked(&self.turn) = turn;
         Ok(())
     }
 
@@ -141,7 +154,7 @@ mod tests {
         let places = Places::new(Limit::Uploads, 1, Duration::ZERO);
         let [(quickly, mut quick, _), (dripping, mut slow, permit)] = [(); 2].map(|()| {
             let (sender, receiver) = mpsc::channel(1000);
-            let permit = UploadPermit::new(&places, Client::Local);
+            let permit = UploadPermit::new(&places, &Arc::new(ClientPermits::new(1)), Client::Local);
             let inner = Body::new(StreamBody::new(ReceiverStream::new(receiver)));
             let body = bounded_upload(inner, permit.clone(), Duration::from_millis(100));
             (sender, body, permit)

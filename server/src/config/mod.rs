@@ -78,8 +78,12 @@ pub struct Config {
     pub learned_grips: usize,
     /// Folder that keeps atlases. `None` for that of [`Self::kept_atlases`].
     pub atlas_directory: Option<PathBuf>,
-    /// Largest number of connections; others wait.
+    /// Largest number of connections; others are closed, or take the place of one without a call.
     pub maximum_connections: NonZeroUsize,
+    /// Longest time without a call on a connection.
+    pub connection_idle: Duration,
+    /// Age from which a connection takes no more calls, give or take a tenth.
+    pub connection_age: Duration,
     /// Largest number of bytes of answers that wait for clients to read them; beyond, the connection with the most is closed.
     pub maximum_unread_bytes: NonZeroUsize,
     /// Origins of the pages that may call from browsers.
@@ -135,6 +139,8 @@ impl Default for Config {
             learned_grips: 32,
             atlas_directory: None,
             maximum_connections: non_zero(1000),
+            connection_idle: Duration::from_mins(5),
+            connection_age: Duration::from_mins(30),
             maximum_unread_bytes: non_zero(32 << 20),
             web_origins: WebOrigins::LOOPBACK,
             viewer: false,
@@ -178,6 +184,12 @@ impl Config {
     /// Number of objects that are prepared for searches at a time: half as many as are received, because that takes less time.
     pub(crate) fn derivations(&self) -> usize {
         self.maximum_uploads.get().div_ceil(2)
+    }
+
+    /// Number of objects and rigs that one client builds or prepares at a time: those take a core each, of which other clients keep
+    /// half.
+    pub(crate) fn heavy_work(&self) -> usize {
+        (self.workers.get() / 2).clamp(1, self.maximum_uploads.get())
     }
 
     /// Largest mesh file in bytes, in one message or in pieces.

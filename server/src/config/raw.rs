@@ -129,9 +129,17 @@ pub struct RawConfig {
     /// files that a crash left behind are removed at the next start.
     #[arg(long, env = "GRASP_ATLAS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
     pub atlas_directory: Option<PathBuf>,
-    /// Most connections; others wait [default: 1000].
+    /// Most connections; others are closed, or take the place of one without a call [default: 1000].
     #[arg(long, env = "GRASP_MAXIMUM_CONNECTIONS", value_name = "COUNT")]
     pub maximum_connections: Option<u64>,
+    /// Longest time without a call on a connection, in milliseconds [default: 300000].
+    #[arg(long, env = "GRASP_CONNECTION_IDLE_MS", value_name = "MS")]
+    pub connection_idle_ms: Option<u64>,
+    /// Age from which a connection takes no more calls, in milliseconds, give or take a tenth [default: 1800000].
+    ///
+    /// Running calls end first, however long they take. Clients open another connection by themselves.
+    #[arg(long, env = "GRASP_CONNECTION_AGE_MS", value_name = "MS")]
+    pub connection_age_ms: Option<u64>,
     /// Most bytes of answers that wait for clients to read them [default: 33554432].
     ///
     /// Beyond, the connection with the most is closed.
@@ -250,6 +258,8 @@ impl RawConfig {
         read!(number(learned_grips => config.learned_grips, 0..=1024));
         read!(folder(atlas_directory => config.atlas_directory,));
         read!(number(maximum_connections => config.maximum_connections, 1..=1_000_000));
+        read!(time(connection_idle_ms => config.connection_idle, 1000..=86_400_000));
+        read!(time(connection_age_ms => config.connection_age, 1000..=86_400_000));
         read!(number(maximum_unread_bytes => config.maximum_unread_bytes, MAX_RESPONSE as u64..=1 << 30));
         read!(text(web_origins => config.web_origins, NEEDED_ORIGINS, parse_origins));
         config.viewer = self.viewer.or(fallback.viewer).unwrap_or(config.viewer);
@@ -390,7 +400,7 @@ mod tests {
         assert_eq!(read, raw);
         assert_eq!(read.complete(RawConfig::default()).unwrap(), config);
         // Every value is printed but that of an absent folder.
-        assert_eq!(text.lines().count(), 32, "{text}");
+        assert_eq!(text.lines().count(), 34, "{text}");
         let error = toml::from_str::<RawConfig>("wokers = 3").unwrap_err();
         assert!(error.to_string().contains("wokers"), "{error}");
     }
@@ -398,7 +408,7 @@ mod tests {
     #[test]
     fn reports_every_invalid_value_with_its_key() {
         // Five numbers may be 0.
-        for (number, expected) in [(0, 27), (i64::MAX, 32)] {
+        for (number, expected) in [(0, 29), (i64::MAX, 34)] {
             let mut raw = RawConfig::default();
             raw.complete(RawConfig::default()).unwrap();
             let mut keys = toml::Table::try_from(&raw).unwrap();

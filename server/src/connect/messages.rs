@@ -41,6 +41,10 @@ const LARGE: usize = 32 << 10;
 /// Bytes of JSON per byte of protobuf, for messages of numbers.
 const JSON_GROWTH: usize = 5;
 
+/// Bytes of protobuf, besides the mesh, that a value in JSON takes at least on average. Values are kept in tens of bytes each while
+/// they are turned.
+const BYTES_OF_VALUE: usize = 2;
+
 /// The layer inside that of calls; see the module documentation.
 #[derive(Clone, Debug)]
 pub(crate) struct Transcoding {
@@ -72,10 +76,19 @@ impl Middleware<Body> for Transcoding {
         let Some(call) = request.extensions_mut().remove::<Call>() else {
             return Box::pin(next(request));
         };
-        let limit = self.limit(request.uri().path(), &call);
+        let path = request.uri().path();
+        let besides_mesh = if is_upload(path) {
+            BYTES_BESIDES_MESH
+        } else {
+            MAX_FIND_REQUEST
+        };
+        let limits = MessageLimits {
+            bytes: self.limit(path, &call),
+            values: besides_mesh / BYTES_OF_VALUE,
+        };
         let reader = Reader {
             call: call.clone(),
-            limit,
+            limits,
             buffer: BytesMut::new(),
             ended: false,
             taken: false,
@@ -140,11 +153,19 @@ fn turned(result: Result<Bytes, ServiceError>) -> PolledFrame {
     Poll::Ready(Some(result.map(Frame::data).map_err(Status::from)))
 }
 
+/// Bounds on a message of a request.
+#[derive(Clone, Copy)]
+struct MessageLimits {
+    /// As it is written, and unpacked.
+    bytes: usize,
+    /// Values in JSON.
+    values: usize,
+}
+
 /// Reads the messages of a request.
 struct Reader {
     call: Call,
-    /// Largest message as it is written, and unpacked.
-    limit: usize,
+    limits: MessageLimits,
     /// What has arrived of the next message, and perhaps of others.
     buffer: BytesMut,
     /// The request has arrived to its end.
@@ -163,8 +184,8 @@ impl FrameFilter for Reader {
             match self.next() {
                 Err(error) => return turned(Err(error)),
                 Ok(Some((message, packed))) => {
-                    let (call, limit, length) = (self.call.clone(), self.limit, message.len());
-                    let turn = move || read(&call, message, packed, limit);
+                    let (call, limits, length) = (self.call.clone(), self.limits, message.len());
+                    let turn = move || read(&call, message, packed, limits);
                     if let Some(message) = self.turning.begin(length, turn) {
                         return turned(message);
                     }
@@ -196,8 +217,9 @@ impl Reader {
         if self.call.format.enveloped {
             return self.next_of_stream();
         }
-        if self.buffer.len() > self.limit {
-            return Err(ServiceError::MessageTooLarge { limit: self.limit });
+        let limit = self.limits.bytes;
+        if self.buffer.len() > limit {
+            return Err(ServiceError::MessageTooLarge { limit });
         }
         let whole = self.ended && !std::mem::replace(&mut self.taken, self.ended);
         Ok(whole.then(|| (self.buffer.split().freeze(), self.call.packed)))
@@ -223,8 +245,9 @@ impl Reader {
         if flags & PACKED != 0 && !self.call.packed {
             return malformed("an envelope is packed, but connect-content-encoding is not gzip".to_owned());
         }
-        if length > self.limit {
-            return Err(ServiceError::MessageTooLarge { limit: self.limit });
+        let limit = self.limits.bytes;
+        if length > limit {
+            return Err(ServiceError::MessageTooLarge { limit });
         }
         let arrived = self.buffer.len() - PREFIX;
         if arrived < length {
@@ -241,26 +264,47 @@ impl Reader {
 }
 
 /// A message of a request as a frame of gRPC.
-fn read(call: &Call, message: Bytes, packed: bool, limit: usize) -> Result<Bytes, ServiceError> {
+fn read(call: &Call, message: Bytes, packed: bool, limits: MessageLimits) -> Result<Bytes, ServiceError> {
     let mut message = message;
     if packed && !message.is_empty() {
-        message = unpacked(&message, limit)?;
+        message = unpacked(&message, limits.bytes)?;
     }
     if call.format.json {
-        message = protobuf(call, &message)?.into();
+        message = protobuf(call, &message, limits.values)?.into();
     }
     Ok(framed(&message))
 }
 
-fn protobuf(call: &Call, text: &[u8]) -> Result<Vec<u8>, ServiceError> {
+fn protobuf(call: &Call, text: &[u8], most_values: usize) -> Result<Vec<u8>, ServiceError> {
     if text.trim_ascii().is_empty() {
         return Err(ServiceError::invalid(
             BODY,
             "is empty; it must be a JSON object, such as {}",
         ));
     }
+    if values(text) > most_values {
+        let problem = format!("has {} values; it may have {most_values}", values(text));
+        return Err(ServiceError::invalid(BODY, problem));
+    }
     bytes_of(&call.method.input(), text)
         .map_err(|error| ServiceError::invalid(error.path.unwrap_or_else(|| BODY.to_owned()), error.problem))
+}
+
+/// Number of values in a JSON text, at most: each follows a bracket or a comma outside texts.
+fn values(text: &[u8]) -> usize {
+    let (mut values, mut rest) = (1, text.iter());
+    while let Some(byte) = rest.next() {
+        match byte {
+            b'{' | b'[' | b',' => values += 1,
+            b'"' => {
+                while let Some(b'\\') = rest.find(|byte| matches!(byte, b'"' | b'\\')) {
+                    rest.next();
+                }
+            }
+            _ => {}
+        }
+    }
+    values
 }
 
 fn unpacked(message: &[u8], limit: usize) -> Result<Bytes, ServiceError> {
@@ -346,6 +390,19 @@ mod tests {
         *,
     };
 
+    #[test]
+    fn values_are_counted_outside_texts() {
+        for (text, expected) in [
+            ("{}", 2),
+            (r#"{"a": [1, 2, {}], "b": "x"}"#, 7),
+            (r#"{"a,[{": "\\", "b": "\",\",[{"}"#, 3),
+            (r#"{"cut \"#, 2),
+            ("[[[[,,,,", 9),
+        ] {
+            assert_eq!(values(text.as_bytes()), expected, "{text}");
+        }
+    }
+
     #[tokio::test]
     async fn envelopes_are_read_in_pieces_of_any_size() {
         let call = Call {
@@ -372,7 +429,10 @@ mod tests {
                 .collect();
             let reader = Reader {
                 call: call.clone(),
-                limit: 100,
+                limits: MessageLimits {
+                    bytes: 100,
+                    values: 10,
+                },
                 buffer: BytesMut::new(),
                 ended: false,
                 taken: false,

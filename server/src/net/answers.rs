@@ -10,7 +10,7 @@ use http::{Request, Response};
 use http_body::Frame;
 use tonic::body::Body;
 
-use super::unread::{Reader, WaitingBytes};
+use super::reader::{OpenRequest, Reader, WaitingBytes};
 use crate::{
     limits::locked,
     middleware::{Answer, FrameFilter, Middleware, PolledFrame, filtered, next_frame},
@@ -31,15 +31,18 @@ impl<B> Middleware<B> for UnreadCount {
         F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
     {
         let reader = request.extensions().get::<Arc<Reader>>().cloned();
-        let open = reader.as_ref().map(|reader| reader.answering());
+        let open = reader.as_ref().map(|reader| reader.begin_request());
         let answer = next(request);
         Box::pin(async move {
             let answer = answer.await?;
-            let Some(reader) = reader else { return Ok(answer) };
+            let (Some(reader), Some(mut request)) = (reader, open) else {
+                return Ok(answer);
+            };
+            request.answered();
             let counting = AnswerCount {
                 rest: None,
                 reader,
-                _open: open,
+                request,
             };
             Ok(answer.map(|inner| filtered(inner, counting)))
         })
@@ -50,7 +53,7 @@ struct AnswerCount {
     /// The rest of the last frame of the body.
     rest: Option<CountedBytes>,
     reader: Arc<Reader>,
-    _open: Option<Arc<()>>,
+    request: OpenRequest,
 }
 
 impl FrameFilter for AnswerCount {
@@ -64,6 +67,7 @@ impl FrameFilter for AnswerCount {
                 other => return other,
             }
         }
+        self.request.sent();
         let chunk = self.rest.as_mut().map(CountedBytes::take_chunk);
         self.rest.take_if(|rest| rest.bytes.is_empty());
         Poll::Ready(chunk.map(|chunk| Ok(Frame::data(chunk))))
@@ -177,36 +181,37 @@ mod tests {
     use http_body_util::{BodyExt as _, Full};
 
     use super::*;
-    use crate::{client::Client, net::unread::UnreadAnswers};
+    use crate::{client::Client, net::connections::Connections};
 
     #[tokio::test]
     async fn chunks_count_until_they_are_dropped() {
-        let all = UnreadAnswers::new(usize::MAX);
+        let all = Connections::new(1, usize::MAX);
         let content: Vec<u8> = (0..3 * CHUNK + 5).map(|byte| byte as u8).collect();
+        let connection = all.admit(&Client::Local).expect("there is a place");
         let counting = AnswerCount {
             rest: None,
-            reader: all.connect(Client::Local),
-            _open: None,
+            reader: Arc::clone(&connection),
+            request: connection.begin_request(),
         };
         let mut body = filtered(Body::new(Full::new(content.clone().into())), counting);
         let mut chunks = Vec::new();
         while let Some(frame) = body.frame().await {
             chunks.push(frame.expect("it does not fail").into_data().expect("it is data"));
-            assert_eq!(all.bytes(), content.len());
+            assert_eq!(all.unread_bytes(), content.len());
         }
         assert_eq!(chunks.concat(), content);
         assert_eq!(chunks.len(), 4);
         let first = chunks.remove(0);
         drop(chunks);
-        assert_eq!(all.bytes(), CHUNK);
+        assert_eq!(all.unread_bytes(), CHUNK);
         drop(first);
-        assert_eq!(all.bytes(), 0);
+        assert_eq!(all.unread_bytes(), 0);
     }
 
     #[test]
     fn nothing_counts_of_a_body_that_is_read_while_its_request_ends() {
-        let all = UnreadAnswers::new(usize::MAX);
-        let reader = all.connect(Client::Local);
+        let all = Connections::new(1, usize::MAX);
+        let reader = all.admit(&Client::Local).expect("there is a place");
         for _ in 0..2_000 {
             let arriving = Arc::new(ArrivingBytes {
                 reader: Arc::clone(&reader),
@@ -219,7 +224,7 @@ mod tests {
                 scope.spawn(|| body.collect().now_or_never());
                 scope.spawn(|| drop(arriving));
             });
-            assert_eq!(all.bytes(), 0);
+            assert_eq!(all.unread_bytes(), 0);
         }
     }
 }

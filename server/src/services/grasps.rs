@@ -83,10 +83,10 @@ impl Handler {
         let size = ObjectSize::of(query.object_size, &stored);
         let mut object = Arc::clone(&stored);
         if let Some(size) = size {
+            let due = call.answer_due();
+            let _turn = before(due, self.heavy.acquire(&call.client)).await?;
             let slot = self.objects.resized(&stored, size)?;
-            let filled = self
-                .resizer
-                .fill(slot, &stored, size, &self.rigs, call.answer_due());
+            let filled = self.resizer.fill(slot, &stored, size, &self.rigs, due);
             object = filled.await?;
             derived = object.derived_until(Stop::NEVER)?;
             since = Instant::now();

@@ -30,8 +30,8 @@ use crate::{
     config::Config,
     error::ServiceError,
     executor::{SearchExecutor, before, run_blocking, run_stoppable},
-    limits::Places,
-    net::UnreadAnswers,
+    limits::{ClientPermits, Places},
+    net::Connections,
     objects::{
         Derived, Revision, StoredObject,
         derived::Resizer,
@@ -65,11 +65,13 @@ pub(crate) struct Shared {
     /// Has a receiver per call in flight.
     pub calls: watch::Sender<()>,
     /// Answers that wait for clients to read them.
-    pub unread: Arc<UnreadAnswers>,
+    pub connections: Arc<Connections>,
     /// Cancelled when the server begins to shut down, which ends streams without an end of their own.
     pub shutdown: CancellationToken,
     /// One permit per object that may be prepared for searches at a time.
     pub deriving: Arc<Semaphore>,
+    /// Permits of each client to build or prepare something: the rest of its work waits without delaying that of others.
+    pub heavy: Arc<ClientPermits>,
     /// One permit: new objects are prepared ahead of calls one at a time.
     pub ahead: Semaphore,
     pub created: AtomicU64,
@@ -122,11 +124,12 @@ impl Shared {
             return Ok(kept);
         }
         let due = call.answer_due();
+        let turn = before(due, self.heavy.acquire(&call.client)).await?;
         let permit = before(due, Arc::clone(&self.deriving).acquire_owned()).await?;
         let permit = permit.map_err(|_| ServiceError::ShuttingDown)?;
         let (objects, object, rig) = (Arc::clone(&self.objects), Arc::clone(object), rig.clone());
         let derived = run_stoppable(due, move |stop| {
-            let _permit = permit;
+            let _permits = (turn, permit);
             let derived = objects.derived(&object, Need::Call, stop)?;
             derived.prepare(&rig, stop)?;
             Ok::<_, ServiceError>(derived)

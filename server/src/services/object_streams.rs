@@ -63,7 +63,7 @@ impl Handler {
         let receiving = tokio::time::timeout(MAX_UPLOAD_TIME, self.receive(parts, call)).await;
         let received = receiving.unwrap_or(late);
         let (request, room) = received.map_err(|error| permit.failure().unwrap_or(error))?;
-        permit.take_place()?;
+        permit.take_turn().await?;
         let limits = self.config.mesh_limits(self.config.streams.upload_bytes);
         let (handler, context) = (self.clone(), call.clone());
         let object = run_stoppable(call.answer_due(), move |stop| {

@@ -215,7 +215,7 @@ impl ObjectService for Handler {
     ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
         let permit = UploadPermit::of(&mut request);
-        permit.take_place()?;
+        permit.take_turn().await?;
         let (handler, context, request) = (self.clone(), call.clone(), request.into_inner());
         let object = run_stoppable(call.answer_due(), move |stop| {
             let _permit = permit;
@@ -271,7 +271,7 @@ impl ObjectService for Handler {
     ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
         let permit = UploadPermit::of(&mut request);
-        permit.take_place()?;
+        permit.take_turn().await?;
         let query = Arc::new(update_query(request.into_inner())?);
         call.log_object(&query.id);
         let mut attempts = 0;

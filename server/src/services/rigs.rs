@@ -95,7 +95,7 @@ impl HandRigService for Handler {
         mut request: Request<v1::CreateRigRequest>,
     ) -> Result<Response<v1::HandRig>, Status> {
         let permit = UploadPermit::of(&mut request);
-        permit.take_place()?;
+        permit.take_turn().await?;
         let (shared, request) = (Arc::clone(&self.0), request.into_inner());
         let rig = run_blocking(move || {
             let _permit = permit;

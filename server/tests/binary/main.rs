@@ -1,6 +1,7 @@
 //! The binary: exit codes, messages, signals, health checks, kills, and memory.
 #![cfg(target_os = "linux")]
 
+mod bombs;
 mod forged;
 mod growth;
 mod kills;

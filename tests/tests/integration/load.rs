@@ -1,11 +1,17 @@
 //! Concurrent calls up to the limits and beyond, and clients that do not read their answers or do not end their requests. Every method
 //! that searches stops its work when its call is dropped, keeps deadlines, and sheds on a full server.
 
-use std::time::{Duration, Instant};
+use std::{
+    net::Ipv4Addr,
+    time::{Duration, Instant},
+};
 
 use bytes::Bytes;
 use grasp_proto::{
-    v1::{self, grasp_service_client::GraspServiceClient, stream_grasps_request::Sent},
+    v1::{
+        self, grasp_service_client::GraspServiceClient, object_service_client::ObjectServiceClient,
+        stream_grasps_request::Sent,
+    },
     wire_duration,
 };
 use grasp_tests::TestServer;
@@ -161,6 +167,56 @@ async fn calls_beyond_the_limit_of_searches_are_shed() {
     }
 }
 
+/// Opens streams until one is refused.
+async fn fill<T>(open: impl AsyncFn() -> Result<T, Status>) -> Vec<T> {
+    let mut opened = Vec::new();
+    loop {
+        match bounded("a stream", open()).await {
+            Ok(stream) => opened.push(stream),
+            Err(status) => {
+                assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
+                return opened;
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_greedy_client_leaves_places_and_time_to_others() {
+    let server = TestServer::start_on(Ipv4Addr::LOCALHOST.into(), |config| {
+        config.maximum_searches = 8.try_into().unwrap();
+        config.streams.watchers = 8.try_into().unwrap();
+    })
+    .await;
+    let hopeless = long(&server).await;
+    let greedy = server.channel_from([127, 0, 0, 2].into()).await;
+    let searches = fill(async || {
+        let mut grasps = GraspServiceClient::new(greedy.clone());
+        grasps
+            .stream_grasps(v1::StreamGraspsRequest::from(hopeless.clone()))
+            .await
+    });
+    let searches = searches.await;
+    let watches = fill(async || {
+        let mut objects = ObjectServiceClient::new(greedy.clone());
+        objects.watch_objects(v1::WatchObjectsRequest::default()).await
+    });
+    let watches = watches.await;
+    assert_eq!((searches.len(), watches.len()), (6, 6), "three quarters");
+    let watching = server
+        .objects()
+        .await
+        .watch_objects(v1::WatchObjectsRequest::default())
+        .await;
+    watching.expect("there is a place for another client");
+    for _ in 0..5 {
+        let answer = find(&server, floating_remote()).await;
+        assert_eq!(answer.outcome(), v1::Outcome::Found);
+    }
+    // All six still search.
+    assert_eq!(server.gauges().searches(), 6);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_long_search_does_not_block_others() {
     let server = TestServer::start().await;
@@ -175,34 +231,6 @@ async fn a_long_search_does_not_block_others() {
         "the short search was answered only after the long one"
     );
     long.abort();
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn connections_beyond_the_limit_wait() {
-    let server = TestServer::start_with(|config| config.maximum_connections = 1.try_into().unwrap()).await;
-    let mut first = server.objects().await;
-    let list = v1::ListObjectsRequest::default;
-    first
-        .list_objects(list())
-        .await
-        .expect("the first connection has a place");
-    let mut second = server.objects_lazily();
-    let waiting = tokio::spawn(async move { second.list_objects(list()).await });
-    for _ in 0..50 {
-        first
-            .list_objects(list())
-            .await
-            .expect("the first connection keeps its place");
-    }
-    assert!(
-        !waiting.is_finished(),
-        "the second connection was served along with the first"
-    );
-    drop(first);
-    bounded("the second connection's answer", waiting)
-        .await
-        .unwrap()
-        .expect("the place is free");
 }
 
 /// A method with a large answer.

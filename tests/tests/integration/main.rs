@@ -1,7 +1,9 @@
 //! The server over real gRPC, in one binary that is linked once.
 
 mod atlases;
+mod attacks;
 mod connect;
+mod connections;
 mod conventions;
 mod examples;
 mod find_grasp;
@@ -10,6 +12,7 @@ mod golden;
 mod known_grips;
 mod load;
 mod module_order;
+mod network;
 mod objects;
 mod own_hands;
 mod panics;

@@ -24,7 +24,7 @@ const SERVER: &[&[&str]] = &[
     &["atlas_slots", "executor", "health_check", "net", "saved", "web"],
     &["rigs"],
     &["answer", "call", "config", "validate"],
-    &["connect", "memory", "objects", "track"],
+    &["connect", "memory", "objects", "open_files", "track"],
     &["atlases"],
     &["search"],
     &["services"],

@@ -4,16 +4,13 @@ use std::{fmt::Write as _, net::SocketAddr};
 
 use bytes::Bytes;
 use grasp_tests::TestServer;
-use h2::{
-    SendStream,
-    client::{ResponseFuture, SendRequest},
-};
-use http::{HeaderMap, HeaderName, Request};
+pub(crate) use grasp_tests::raw::{Connection, OpenCall, framed, framed_bytes};
+use h2::client::ResponseFuture;
+use http::{HeaderMap, HeaderName};
 use prost::Message;
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     net::TcpStream,
-    task::JoinHandle,
 };
 use tonic::{Code, Status};
 
@@ -77,57 +74,6 @@ fn fields(text: &str) -> Vec<(String, String)> {
     pairs
         .map(|(name, value)| (name.trim().to_ascii_lowercase(), value.trim().to_owned()))
         .collect()
-}
-
-/// A message as gRPC frames it.
-pub(crate) fn framed(message: &impl Message) -> Vec<u8> {
-    framed_bytes(&message.encode_to_vec())
-}
-
-/// Bytes as gRPC frames a message.
-pub(crate) fn framed_bytes(message: &[u8]) -> Vec<u8> {
-    let length = u32::try_from(message.len()).unwrap().to_be_bytes();
-    [&[0], &length[..], message].concat()
-}
-
-/// A connection over HTTP/2.
-pub(crate) struct Connection {
-    sender: SendRequest<Bytes>,
-    pub(crate) task: JoinHandle<Result<(), h2::Error>>,
-}
-
-/// A call whose request goes on.
-pub(crate) type OpenCall = (ResponseFuture, SendStream<Bytes>);
-
-impl Connection {
-    /// Connects; each call's answer may have `window` bytes before some are read.
-    pub(crate) async fn open(server: &TestServer, window: u32) -> Self {
-        let stream = TcpStream::connect(server.address()).await.unwrap();
-        let mut builder = h2::client::Builder::new();
-        let (sender, connection) = builder
-            .initial_window_size(window)
-            .handshake(stream)
-            .await
-            .unwrap();
-        Self {
-            sender,
-            task: tokio::spawn(connection),
-        }
-    }
-
-    /// Begins a call of a method, such as "grasp.v1.ObjectService/GetObject"; `None` if the connection is closed. `headers` replace
-    /// the usual content type if they have one.
-    pub(crate) async fn call(&mut self, method: &str, headers: &[(&str, &str)]) -> Option<OpenCall> {
-        let mut request = Request::post(format!("http://localhost/{method}")).header("te", "trailers");
-        if headers.iter().all(|(name, _)| *name != "content-type") {
-            request = request.header("content-type", "application/grpc");
-        }
-        for &(name, value) in headers {
-            request = request.header(name, value);
-        }
-        self.sender = self.sender.clone().ready().await.ok()?;
-        self.sender.send_request(request.body(()).unwrap(), false).ok()
-    }
 }
 
 /// The whole answer to a call over HTTP/2; its trailers are among the headers.

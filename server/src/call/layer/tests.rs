@@ -70,6 +70,7 @@ fn admitting_one() -> Calls {
         in_flight: watch::Sender::new(()),
         executor: SearchExecutor::new(1, 8).expect("a thread starts"),
         longest_search: Duration::from_secs(10),
+        heavy: Arc::new(ClientPermits::new(1)),
         reads: Arc::default(),
         uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),

@@ -1,0 +1,112 @@
+//! Fairness: a client that keeps to its share is served as if it were alone, whatever another one does.
+
+mod greedy;
+mod modest;
+
+use std::time::Duration;
+
+use crate::{
+    Failure,
+    bench::{Bench, DEADLINE, NO_ATLASES},
+    load::{LIGHT, OpenLoop, Tally, connect, find_grasp},
+    report::{Row, Unit},
+    server::ServerProcess,
+};
+
+/// Least share of what the light client has alone, and the aim.
+const OF_SOLO: [f64; 2] = [0.9, 0.95];
+
+/// The light client's searches, as a share of saturation.
+const LIGHT_SHARE: f64 = 0.2;
+
+/// Time between the light client's uses of what the heavy one takes.
+const PROBE_EVERY: Duration = Duration::from_millis(200);
+
+/// Time for the heavy client to take what it can get.
+const TAKES: Duration = Duration::from_millis(500);
+
+/// What the heavy client takes.
+#[derive(Clone, Copy, Debug)]
+enum Resource {
+    /// Searches at ten times saturation.
+    Searches,
+    /// Streams of grasps with budgets of ten seconds.
+    Streams,
+    /// Tracks, most of them forgotten, and frames of some.
+    Tracks,
+    /// Uploads that trickle.
+    Uploads,
+    /// Meshes that it does not read.
+    Meshes,
+    /// Watches.
+    Watches,
+    /// Rigs, which it keeps.
+    Rigs,
+    /// Connections on which it says nothing.
+    Connections,
+}
+
+impl Resource {
+    const ALL: [Self; 8] = [
+        Self::Searches,
+        Self::Streams,
+        Self::Tracks,
+        Self::Uploads,
+        Self::Meshes,
+        Self::Watches,
+        Self::Rigs,
+        Self::Connections,
+    ];
+}
+
+pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
+    let saturation = bench.saturation().await?;
+    let server = bench.server(NO_ATLASES)?;
+    bench.step("fairness: a light client alone");
+    let solo = light(bench, &server, LIGHT_SHARE * saturation).await?;
+    let mut rows = Vec::new();
+    for resource in Resource::ALL {
+        bench.step(format_args!("fairness: {resource:?}"));
+        // A server of its own, so that nothing is left of the attack before.
+        let server = bench.server(NO_ATLASES)?;
+        let modest = modest::Modest::new(&server, resource).await?;
+        let greedy = greedy::attack(bench, &server, resource, 10.0 * saturation).await?;
+        tokio::time::sleep(TAKES).await;
+        let probes = tokio::spawn(modest.uses(PROBE_EVERY, length(bench)));
+        let beside = light(bench, &server, LIGHT_SHARE * saturation).await?;
+        let probes = probes.await?;
+        drop(greedy);
+        let of_solo = beside.goodput() / solo.goodput();
+        rows.push(Row::at_least(
+            &format!("fairness beside {}", format!("{resource:?}").to_lowercase()),
+            Unit::Share,
+            OF_SOLO,
+            of_solo.min(probes.share()),
+            format!(
+                "{:.0} % of {:.0}/s alone, p99 {:.0} ms instead of {:.0} ms; {probes}",
+                100.0 * of_solo,
+                solo.goodput(),
+                beside.latency_ms(0.99, |_| true),
+                solo.latency_ms(0.99, |_| true),
+            ),
+        ));
+    }
+    Ok(rows)
+}
+
+fn length(bench: &Bench) -> Duration {
+    bench.seconds(20, 3)
+}
+
+/// The light client's searches; the same ones each time.
+async fn light(bench: &Bench, server: &ServerProcess, rate: f64) -> Result<Tally, Failure> {
+    let channels = connect(server.address, LIGHT, 2).await?;
+    let load = OpenLoop {
+        rate,
+        length: length(bench),
+        deadline: DEADLINE,
+        tries: 1,
+        seed: 7,
+    };
+    Ok(load.run(find_grasp(&channels, &bench.requests.searching)).await)
+}
