@@ -39,23 +39,6 @@ fn output(line: &str, variables: &[(&str, &str)]) -> (i32, String) {
     (code, text)
 }
 
-/// A folder for files of a test, removed with it.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(test: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("grasp-binary-{test}-{}", std::process::id()));
-        fs::create_dir_all(&path).expect("it can be created");
-        Self(path)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
 /// A running server, killed when it is dropped.
 struct Running {
     child: Child,
@@ -138,10 +121,16 @@ impl Drop for Running {
     }
 }
 
-/// A test's own folder, absent at first and removed at the end.
+/// A test's own folder, removed at the end.
 struct Folder(PathBuf);
 
 impl Folder {
+    fn new(test: &str) -> Self {
+        let folder = Self::absent(test);
+        fs::create_dir_all(&folder.0).expect("it can be created");
+        folder
+    }
+
     fn absent(test: &str) -> Self {
         Self(std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id())))
     }
