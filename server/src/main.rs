@@ -264,7 +264,7 @@ impl Rereading<'_> {
             && let Ok(filter) = config.log.parse::<Targets>()
             && self.log_filter.reload(filter).is_ok()
         {
-            self.values.log = values.log.clone();
+            self.values.log.clone_from(&values.log);
             tracing::info!(log = config.log, "applied a change of the configuration");
         }
         for key in self.values.differences(&values) {
