@@ -384,7 +384,7 @@ mod tests {
         assert_eq!(read, raw);
         assert_eq!(read.complete(RawConfig::default()).unwrap(), config);
         // Every value is printed but that of an absent folder.
-        assert_eq!(text.lines().count(), 35, "{text}");
+        assert_eq!(text.lines().count(), 36, "{text}");
         let error = toml::from_str::<RawConfig>("wokers = 3").unwrap_err();
         assert!(error.to_string().contains("wokers"), "{error}");
     }
