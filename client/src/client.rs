@@ -2,6 +2,7 @@
 
 use std::{
     error::Error as _,
+    fmt,
     future::Future,
     pin::Pin,
     time::{Duration, Instant},
@@ -11,7 +12,8 @@ use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
 use serde::Serialize;
 use tonic::{
     Code, Request, Response, Status,
-    transport::{Channel, Endpoint},
+    metadata::{Ascii, MetadataValue},
+    transport::{Certificate, Channel, ClientTlsConfig, Endpoint, Identity},
 };
 use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
@@ -47,7 +49,23 @@ pub struct GraspClientBuilder {
     connect_timeout: Duration,
     call_timeout: Duration,
     retry: RetryPolicy,
+    authorization: Option<Authorization>,
+    ca: Option<Certificate>,
+    identity: Option<ClientIdentity>,
 }
+
+/// A certificate and its key, which no log shows.
+#[derive(Clone)]
+struct ClientIdentity(Identity);
+
+impl fmt::Debug for ClientIdentity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("ClientIdentity")
+    }
+}
+
+/// The value of the header that every call has.
+type Authorization = MetadataValue<Ascii>;
 
 impl GraspClientBuilder {
     /// Time limit for connecting. Default: 5 s.
@@ -69,6 +87,33 @@ impl GraspClientBuilder {
     #[must_use]
     pub fn retry(mut self, policy: RetryPolicy) -> Self {
         self.retry = policy;
+        self
+    }
+
+    /// Sends a token with every call, for servers that demand one. Use a URL with https, or anyone on the way can read it.
+    ///
+    /// # Errors
+    /// [`ClientError::Token`].
+    pub fn token(mut self, secret: &str) -> Result<Self, ClientError> {
+        let mut value: Authorization = format!("Bearer {secret}")
+            .parse()
+            .map_err(|_| ClientError::Token)?;
+        value.set_sensitive(true);
+        self.authorization = Some(value);
+        Ok(self)
+    }
+
+    /// Trusts servers with certificates of this authority (PEM), instead of those of the system's authorities.
+    #[must_use]
+    pub fn ca_certificate(mut self, pem: impl AsRef<[u8]>) -> Self {
+        self.ca = Some(Certificate::from_pem(pem));
+        self
+    }
+
+    /// Shows a certificate (PEM) to the server, with its key, for servers that know their clients by certificates.
+    #[must_use]
+    pub fn client_certificate(mut self, pem: impl AsRef<[u8]>, key: impl AsRef<[u8]>) -> Self {
+        self.identity = Some(ClientIdentity(Identity::from_pem(pem, key)));
         self
     }
 
@@ -94,12 +139,13 @@ impl GraspClientBuilder {
         Ok(self.over(channel))
     }
 
-    /// Uses an existing channel, for instance one with TLS. The connect timeout does not apply.
+    /// Uses an existing channel. The connect timeout and certificates do not apply.
     pub fn over(self, channel: Channel) -> GraspClient {
         GraspClient {
             channel,
             call_timeout: self.call_timeout,
             retry: self.retry,
+            authorization: self.authorization,
         }
     }
 
@@ -108,10 +154,24 @@ impl GraspClientBuilder {
             endpoint: self.endpoint.clone(),
             source,
         };
-        let endpoint =
+        let mut endpoint =
             Endpoint::from_shared(self.endpoint.clone()).map_err(|error| endpoint_error(error.into()))?;
         if endpoint.uri().scheme_str().is_none() || endpoint.uri().host().is_none() {
             return Err(endpoint_error("it has no scheme or no host".into()));
+        }
+        if endpoint.uri().scheme_str() == Some("https") {
+            let mut tls = match &self.ca {
+                Some(ca) => ClientTlsConfig::new().ca_certificate(ca.clone()),
+                None => ClientTlsConfig::new().with_native_roots(),
+            };
+            if let Some(ClientIdentity(identity)) = &self.identity {
+                tls = tls.identity(identity.clone());
+            }
+            endpoint = endpoint
+                .tls_config(tls)
+                .map_err(|error| endpoint_error(error.into()))?;
+        } else if self.ca.is_some() || self.identity.is_some() {
+            return Err(endpoint_error("certificates need a URL with https".into()));
         }
         Ok(endpoint
             .connect_timeout(self.connect_timeout)
@@ -148,6 +208,7 @@ pub struct GraspClient {
     channel: Channel,
     pub(crate) call_timeout: Duration,
     pub(crate) retry: RetryPolicy,
+    authorization: Option<Authorization>,
 }
 
 impl GraspClient {
@@ -166,6 +227,9 @@ impl GraspClient {
             connect_timeout: DEFAULT_CONNECT_TIMEOUT,
             call_timeout: DEFAULT_CALL_TIMEOUT,
             retry: RetryPolicy::default(),
+            authorization: None,
+            ca: None,
+            identity: None,
         }
     }
 
@@ -259,6 +323,11 @@ impl GraspClient {
             let remaining = timeout.saturating_sub(start.elapsed());
             let mut request = Request::new(message.clone());
             request.set_timeout(remaining);
+            if let Some(authorization) = &self.authorization {
+                request
+                    .metadata_mut()
+                    .insert("authorization", authorization.clone());
+            }
             let result = tokio::time::timeout(remaining, send(self.channel.clone(), request)).await;
             let status = match result {
                 Ok(Ok(response)) => return Ok(response.into_inner()),

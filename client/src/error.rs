@@ -12,7 +12,7 @@ pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClientError {
-    /// The endpoint is not a URL.
+    /// The endpoint is not a URL, or cannot be used with the given certificates.
     #[error("endpoint {endpoint:?} is not a URL like http://[::1]:50051")]
     Endpoint {
         /// The endpoint as given.
@@ -20,6 +20,9 @@ pub enum ClientError {
         /// Why it is invalid.
         source: BoxError,
     },
+    /// The token has characters that no header can have.
+    #[error("the token has characters other than those of printable ASCII")]
+    Token,
     /// The connection failed.
     #[error("cannot connect to {endpoint}")]
     Connect {

@@ -1,4 +1,4 @@
-//! Retries: on UNAVAILABLE, and on RESOURCE_EXHAUSTED if the server asks for a wait; with exponential backoff, a bounded number of
+//! Retries: on `UNAVAILABLE`, and on `RESOURCE_EXHAUSTED` if the server asks for a wait; with exponential backoff, a bounded number of
 //! times, and within the call's deadline. The server may ask for a longer wait (`RetryInfo`), set the wait, or forbid a retry
 //! (trailer `grpc-retry-pushback-ms`, gRPC proposal A6).
 

@@ -3,15 +3,18 @@
 use std::{
     fmt,
     net::{IpAddr, Ipv6Addr},
+    sync::Arc,
 };
 
-/// A client: all calls from the same address.
+/// A client: all calls with the same token or certificate, or else from the same address.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Client {
     /// An address or, of IPv6, its network of 64 bits, all of which one client may have.
     Address(IpAddr),
     /// A process of this machine, on a socket in the file system.
     Local,
+    /// The name of a token or certificate.
+    Named(Arc<str>),
 }
 
 impl Client {
@@ -32,6 +35,7 @@ impl fmt::Display for Client {
         match self {
             Self::Address(address) => address.fmt(f),
             Self::Local => f.write_str("local"),
+            Self::Named(name) => f.write_str(name),
         }
     }
 }

@@ -4,6 +4,7 @@
 //! workers' threads are named `grasp-search-N` and shared by all jobs.
 
 use std::{
+    panic::AssertUnwindSafe,
     sync::{
         Arc,
         atomic::{AtomicU64, Ordering},
@@ -11,13 +12,16 @@ use std::{
     time::{Duration, Instant},
 };
 
+use futures_util::FutureExt as _;
 use grasp_admission::{Gate, Job, TooLate};
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     client::Client,
     error::{Limit, ServiceError},
+    faults::{FaultPoint, Faults},
     limits::{Place, Places},
     metrics::Histogram,
 };
@@ -29,12 +33,13 @@ pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
-/// Jobs that have a turn at once: the second one keeps the workers busy while the first one begins or ends.
-const TURNS: usize = 2;
+/// Jobs that have a turn at once. Each uses all workers; another one's slice would come before its next.
+const TURNS: usize = 1;
 
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
+    pub faults: Faults,
     /// A place per running or waiting job.
     pub places: Places,
     gate: Gate<Client>,
@@ -63,9 +68,16 @@ pub(crate) struct Admission {
     job: Arc<Job<Client>>,
     queue_time: Arc<QueueTime>,
     _place: Place,
+    /// Of the client's own quota.
+    _own: Option<OwnedSemaphorePermit>,
 }
 
 impl Admission {
+    /// The same within a client's quota.
+    pub(crate) fn within(self, own: Option<OwnedSemaphorePermit>) -> Self {
+        Self { _own: own, ..self }
+    }
+
     /// Sets when the job has to end, and whether it goes on as long as there is time, for which others do not wait.
     pub(crate) fn set_due(&self, due: Instant, yields: bool) {
         self.job.set_due(due, yields);
@@ -95,15 +107,22 @@ impl Workers<'_> {
         Workers { pool, job: None }
     }
 
-    /// Does a slice of the job's work when its turn has come; at once if the job is over, which the work notices.
-    pub(crate) fn in_turn<T>(self, work: impl FnOnce(&ThreadPool) -> T) -> T {
-        let _turn = self.job.and_then(|(job, queue_time)| {
+    /// Does a slice of the job's work when its turn has come. If there is none within `longest`, or the job is over, it has no time
+    /// left, which the work notices. The turn lasts until the next slice, or [`Self::end_turn`].
+    pub(crate) fn in_turn<T>(self, longest: Option<Duration>, work: impl FnOnce(&ThreadPool) -> T) -> T {
+        if let Some((job, queue_time)) = self.job {
             let start = Instant::now();
-            let turn = job.turn();
+            job.next_turn(longest);
             queue_time.add(start.elapsed());
-            turn
-        });
+        }
         work(self.pool)
+    }
+
+    /// Leaves the workers to others until the next slice.
+    pub(crate) fn end_turn(self) {
+        if let Some((job, _)) = self.job {
+            job.end_turn();
+        }
     }
 }
 
@@ -127,6 +146,7 @@ impl SearchExecutor {
             .build()?;
         Ok(Self {
             pool: Arc::new(pool),
+            faults: Faults::default(),
             places: Places::new(Limit::Searches, maximum, RETRY_AFTER),
             gate: Gate::new(TURNS),
             queue: Arc::default(),
@@ -142,6 +162,7 @@ impl SearchExecutor {
             job: Arc::new(job),
             queue_time: Arc::default(),
             _place: place,
+            _own: None,
         })
     }
 
@@ -160,7 +181,8 @@ impl SearchExecutor {
         admission: Admission,
         job: impl FnOnce(Workers<'_>, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let (pool, queue) = (Arc::clone(&self.pool), Arc::clone(&self.queue));
+        let pool = Arc::clone(&self.pool);
+        let (faults, queue) = (self.faults.clone(), Arc::clone(&self.queue));
         let _waiting = Waiting(Arc::clone(&admission.job));
         run_blocking(move || {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
@@ -170,7 +192,14 @@ impl SearchExecutor {
                 pool: &pool,
                 job: Some((of_job, &admission.queue_time)),
             };
-            let output = job(workers, Stop::when(&|| of_job.is_cancelled()));
+            faults.at(FaultPoint::Coordinator);
+            let is_over = || {
+                if rayon::current_thread_index().is_some() {
+                    faults.at(FaultPoint::Worker);
+                }
+                of_job.is_cancelled()
+            };
+            let output = job(workers, Stop::when(&is_over));
             queue.record(admission.queue_time.get());
             if !of_job.is_cancelled() {
                 of_job.done();
@@ -208,6 +237,14 @@ pub(crate) async fn before<T>(
     }
 }
 
+/// The output of a future, or [`ServiceError::Panicked`]. For work whose values are dropped after a panic.
+pub(crate) async fn contained<T>(
+    future: impl Future<Output = Result<T, ServiceError>>,
+) -> Result<T, ServiceError> {
+    let output = AssertUnwindSafe(future).catch_unwind().await;
+    output.unwrap_or(Err(ServiceError::Panicked))
+}
+
 /// Runs blocking work away from the threads of the async runtime.
 pub(crate) async fn run_blocking<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
@@ -237,7 +274,7 @@ mod tests {
         };
         for _ in 0..8 {
             let bad = executor.run(admit(), |workers, _| {
-                workers.in_turn(|pool| {
+                workers.in_turn(None, |pool| {
                     pool.in_place_scope(|scope| {
                         scope.spawn(|_| panic!("on purpose"));
                         scope.spawn(|_| {});
@@ -249,7 +286,9 @@ mod tests {
         }
         let threads = executor
             .run(admit(), |workers, _| {
-                workers.in_turn(|pool| pool.broadcast(|_| thread::current().name().map(str::to_owned)))
+                workers.in_turn(None, |pool| {
+                    pool.broadcast(|_| thread::current().name().map(str::to_owned))
+                })
             })
             .await
             .unwrap();

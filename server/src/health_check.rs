@@ -5,23 +5,24 @@ use std::{
     time::Duration,
 };
 
-use tonic::transport::{Channel, Endpoint};
+use tonic::transport::{Channel, ClientTlsConfig, Endpoint};
 use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
 
-use crate::listen::ListenAddress;
+use crate::{listen::ListenAddress, tls::unverified_server};
 
 /// Time limit for connection and answer, below the default of Kubernetes' probes, one second.
 const TIMEOUT: Duration = Duration::from_millis(900);
 
 /// Asks the server that listens on these addresses for its overall health, at the first that can be reached. For an unspecified
-/// address, it connects over the loopback interface, and for the default one also over that of IPv4.
+/// address, it connects over the loopback interface, and for the default one also over that of IPv4. With `tls`, connections of TCP are
+/// encrypted; the server's certificate may have any name, and be of any authority.
 ///
 /// # Errors
 /// Says in words why the answer within 900 ms was not `SERVING`.
-pub async fn check_health(listen: &[ListenAddress]) -> Result<(), String> {
-    let answered = tokio::time::timeout(TIMEOUT, ask_any(listen)).await;
+pub async fn check_health(listen: &[ListenAddress], tls: bool) -> Result<(), String> {
+    let answered = tokio::time::timeout(TIMEOUT, ask_any(listen, tls)).await;
     answered.unwrap_or_else(|_| {
         let places: Vec<String> = listen
             .iter()
@@ -35,11 +36,11 @@ pub async fn check_health(listen: &[ListenAddress]) -> Result<(), String> {
     })
 }
 
-async fn ask_any(listen: &[ListenAddress]) -> Result<(), String> {
+async fn ask_any(listen: &[ListenAddress], tls: bool) -> Result<(), String> {
     let fallback = (listen == [ListenAddress::DEFAULT]).then_some(&ListenAddress::DEFAULT_V4);
     let mut failures = Vec::new();
     for address in listen.iter().chain(fallback) {
-        match connect(address).await {
+        match connect(address, tls).await {
             Ok(channel) => return ask(address, channel).await,
             Err(failure) => failures.push(failure),
         }
@@ -59,7 +60,7 @@ fn reachable(listen: &ListenAddress) -> ListenAddress {
     ListenAddress::Tcp(SocketAddr::new(ip, address.port()))
 }
 
-async fn connect(listen: &ListenAddress) -> Result<Channel, String> {
+async fn connect(listen: &ListenAddress, tls: bool) -> Result<Channel, String> {
     let address = reachable(listen);
     let uri = match &address {
         ListenAddress::Tcp(address) if address.port() == 0 => {
@@ -67,12 +68,17 @@ async fn connect(listen: &ListenAddress) -> Result<Channel, String> {
                 "listen is {listen}; the port must be more than 0 for a health check"
             ));
         }
+        ListenAddress::Tcp(address) if tls => format!("https://{address}"),
         ListenAddress::Tcp(address) => format!("http://{address}"),
         ListenAddress::Unix(_) => address.to_string(),
     };
     let failed =
         |error: tonic::transport::Error| format!("cannot connect to {address}: {}", innermost(&error));
-    let endpoint = Endpoint::from_shared(uri).map_err(failed)?;
+    let mut endpoint = Endpoint::from_shared(uri).map_err(failed)?;
+    if tls && matches!(address, ListenAddress::Tcp(_)) {
+        let any = endpoint.tls_config_with_verifier(ClientTlsConfig::new(), unverified_server());
+        endpoint = any.map_err(failed)?;
+    }
     endpoint.connect().await.map_err(failed)
 }
 
@@ -117,7 +123,9 @@ mod tests {
         ] {
             assert_eq!(reachable(&listen.parse().unwrap()), expected.parse().unwrap());
         }
-        let error = check_health(&["[::1]:0".parse().unwrap()]).await.unwrap_err();
+        let error = check_health(&["[::1]:0".parse().unwrap()], false)
+            .await
+            .unwrap_err();
         assert!(error.contains("the port must be more than 0"), "{error}");
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! [`run`] serves on a listener, and [`Server::serve`] on several, until it is shut down; the binary `grasp-server` adds flags, logs and signals.
 //!
-//! A request passes these modules: `call` records its arrival and deadline; `services` handles it; `validate` turns the message
+//! A request passes these modules: `call` records its arrival and deadline, and `access` lets it in or refuses it; `services` handles it; `validate` turns the message
 //! into checked values or a list of all errors; `objects` finds the object with its search structures, `rigs` the hands, and
 //! `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and stops it when the call is
 //! dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages go through
@@ -11,7 +11,8 @@
 //!
 //! `wire` converts single values of the contract, `middleware` is the form of layers around services. `web` lets pages in browsers
 //! call, and refuses pages of other origins and protocols other than gRPC, gRPC-Web and Connect, which `connect` turns into gRPC.
-//! `listen` has the addresses and sockets on which the server listens.
+//! `listen` has the addresses and sockets on which the server listens, `tls` encrypts connections, and `reload` reads changed files
+//! again.
 //!
 //! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
 //! contents.
@@ -21,16 +22,16 @@
 //!
 //! Before serving, `memory` and `open_files` compare the configured limits with those of the process, and `objects::directory` loads
 //! the folder of objects. Between calls, `atlases` builds atlases in the background.
-//! `health_check` is a client: it asks a running server for its health.
+//! `health_check` is a client: it asks a running server for its health. `faults` are those that tests inject.
 //!
 //! # Order of modules
 //!
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  client  convention  error  methods  middleware  warning_rate  wire
-//! limits  listen  log_lines  metrics  traces  viewer
-//! atlas_slots  executor  health_check  net  saved  web
+//! budget  client  convention  error  faults  methods  middleware  reload  warning_rate  wire
+//! limits  listen  log_lines  metrics  tls  traces  viewer
+//! access  atlas_slots  executor  health_check  net  saved  web
 //! rigs
 //! answer  call  config  validate
 //! connect  memory  objects  open_files  track
@@ -45,6 +46,7 @@
 //! the engines' axes, only `error` knows status codes, and only `executor`, `atlases` and the preparation of objects
 //! and hands start threads.
 
+mod access;
 mod answer;
 mod atlas_slots;
 mod atlases;
@@ -56,6 +58,7 @@ mod connect;
 mod convention;
 mod error;
 mod executor;
+mod faults;
 mod health_check;
 mod limits;
 mod listen;
@@ -68,11 +71,13 @@ mod monitor;
 mod net;
 mod objects;
 mod open_files;
+mod reload;
 mod rigs;
 mod saved;
 mod search;
 mod serve;
 mod services;
+mod tls;
 mod traces;
 mod track;
 mod validate;
@@ -81,8 +86,11 @@ mod warning_rate;
 mod web;
 mod wire;
 
+pub use access::new_token;
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
+#[doc(hidden)]
+pub use faults::FaultPoint;
 pub use health_check::check_health;
 pub use limits::{StoreLimits, StreamLimits};
 pub use listen::{ListenAddress, Listener};
@@ -90,6 +98,8 @@ pub use log_lines::LogLines;
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use open_files::fit_open_files;
+pub use reload::Reloader;
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};
+pub use tls::TlsFiles;
 pub use web::WebOrigins;

@@ -94,7 +94,7 @@ impl Places {
 
     /// Number of all places.
     pub(crate) fn maximum(&self) -> usize {
-        self.0.maximum
+        self.all.maximum()
     }
 
     pub(crate) fn taken(&self) -> usize {

@@ -49,6 +49,16 @@ impl ListenAddress {
     )));
 }
 
+impl ListenAddress {
+    /// True if only processes of this machine can reach it.
+    pub(crate) fn is_private(&self) -> bool {
+        match self {
+            Self::Tcp(address) => address.ip().to_canonical().is_loopback(),
+            Self::Unix(_) => true,
+        }
+    }
+}
+
 impl FromStr for ListenAddress {
     type Err = String;
 

@@ -12,12 +12,15 @@ use std::{
 use clap::{CommandFactory as _, Parser};
 use futures_util::future::select_all;
 use grasp_server::{
-    Config, ListenAddress, Listener, LogLines, Server, check_health,
+    Config, ConfigError, ListenAddress, Listener, LogLines, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
-    fit_open_files, is_reserved_memory_limited, warn_of_memory,
+    fit_open_files, is_reserved_memory_limited, new_token, warn_of_memory,
 };
+use rustix::fs::Mode;
 use tokio::signal::unix::{SignalKind, signal};
-use tracing_subscriber::{filter::Targets, fmt, layer::SubscriberExt as _, util::SubscriberInitExt as _};
+use tracing_subscriber::{
+    Registry, filter::Targets, fmt, layer::SubscriberExt as _, reload, util::SubscriberInitExt as _,
+};
 
 /// How long to wait at the end for work that has not stopped.
 const RUNTIME_END: Duration = Duration::from_millis(500);
@@ -28,8 +31,9 @@ const RUNTIME_END: Duration = Duration::from_millis(500);
 /// overrides the file.
 ///
 /// The server refuses to start, prints the reason and exits with 1 if a value or an object of the objects directory is
-/// invalid. After SIGTERM, SIGINT, SIGQUIT or SIGHUP, which a terminal sends when it is closed, it
-/// answers running calls and exits with 0; a second signal ends it at once, with 1.
+/// invalid. After SIGTERM, SIGINT or SIGQUIT it answers running calls and exits with 0. After SIGHUP it does the same if its
+/// standard input is a terminal, which sends the signal when it is closed; otherwise it reads certificates, tokens
+/// and the filter of the log again. A second signal ends it at once, with 1.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
 struct Flags {
@@ -47,12 +51,17 @@ struct Flags {
     /// Print the descriptor set of the contract, for tools without reflection, and exit.
     #[arg(long, conflicts_with_all = ["print_config", "health_check"])]
     descriptor_set: bool,
+    /// Make a token for a client, print its entry for the file of tokens and, to standard error, the secret, and exit.
+    ///
+    /// grasp-server --new-token NAME >> tokens.toml
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["print_config", "health_check", "descriptor_set"])]
+    new_token: Option<String>,
     #[command(flatten)]
     values: RawConfig,
 }
 
 fn main() -> ExitCode {
-    match start(Flags::parse()) {
+    match start(&Flags::parse()) {
         Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error}");
@@ -72,35 +81,55 @@ fn limit_arenas() -> io::Result<()> {
     Err(again.args(env::args_os().skip(1)).env(VARIABLE, "2").exec())
 }
 
-fn start(mut flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
-    if flags.descriptor_set {
-        print_descriptor_set()?;
-        return Ok(ExitCode::SUCCESS);
-    }
+/// The configuration from all sources: every value for people, and checked.
+fn configuration(flags: &Flags) -> Result<(RawConfig, Config), ConfigError> {
     let file = match &flags.config {
         Some(path) => read_file(path)?,
         None => RawConfig::default(),
     };
-    let mut config = flags.values.complete(file)?;
+    let mut values = flags.values.clone();
+    let config = values.complete(file)?;
+    Ok((values, config))
+}
+
+fn start(flags: &Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
+    if flags.descriptor_set {
+        print_descriptor_set()?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(name) = &flags.new_token {
+        let (secret, entry) = new_token(name)?;
+        print!("{entry}");
+        eprintln!("{secret}");
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (values, mut config) = configuration(flags)?;
     if flags.print_config {
-        print!("{}", toml::to_string(&flags.values)?);
+        print!("{}", toml::to_string(&values)?);
         return Ok(ExitCode::SUCCESS);
     }
     if flags.health_check {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()?;
-        runtime.block_on(check_health(&config.listen))?;
+        runtime.block_on(check_health(&config.listen, config.tls.is_some()))?;
         return Ok(ExitCode::SUCCESS);
     }
+    // Files of the store are private from their first moment, even where a library creates them.
+    rustix::process::umask(Mode::RWXG | Mode::RWXO);
     let arenas = limit_arenas();
-    start_log(&config)?;
+    let log_filter = start_log(&config)?;
     if let Err(error) = arenas {
         tracing::warn!(%error, "cannot start again with fewer arenas: allocations may fail below the limit of reserved memory");
     }
     fit_open_files(&mut config);
     let json = config.log_format == LogFormat::Json;
-    match run(&config) {
+    let rereading = Rereading {
+        flags,
+        values,
+        log_filter,
+    };
+    match run(&config, rereading) {
         Ok(()) => Ok(ExitCode::SUCCESS),
         // Readers of a JSON log need the reason there, too.
         Err(error) if json && tracing::enabled!(tracing::Level::ERROR) => {
@@ -122,7 +151,7 @@ fn print_descriptor_set() -> Result<(), Box<dyn std::error::Error>> {
     Ok(output.flush()?)
 }
 
-fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
+fn run(config: &Config, rereading: Rereading<'_>) -> Result<(), Box<dyn std::error::Error>> {
     let variables = env::vars_os().filter_map(|(name, _)| name.into_string().ok());
     let flags = Flags::command();
     let known = flags.get_arguments().filter_map(|argument| argument.get_env());
@@ -142,12 +171,16 @@ fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
         .max_blocking_threads(config.blocking_threads())
         .enable_all()
         .build()?;
-    let result = runtime.block_on(serve(config, server));
+    let result = runtime.block_on(serve(config, server, rereading));
     runtime.shutdown_timeout(RUNTIME_END);
     result
 }
 
-async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error::Error>> {
+async fn serve(
+    config: &Config,
+    server: Server,
+    mut rereading: Rereading<'_>,
+) -> Result<(), Box<dyn std::error::Error>> {
     let listeners = Listener::bind_all(&config.listen).await;
     let listeners = listeners.map_err(|(address, error)| format!("cannot listen on {address}: {error}"))?;
     // Before logging that the server is there: from now on, signals start the drain.
@@ -155,11 +188,28 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
         SignalKind::terminate(),
         SignalKind::interrupt(),
         SignalKind::quit(),
-        SignalKind::hangup(),
     ];
     let mut signals = kinds.into_iter().map(signal).collect::<io::Result<Vec<_>>>()?;
+    let mut hangup = signal(SignalKind::hangup())?;
+    // Services have none: for them, the signal means to read the configuration again.
+    let has_terminal = io::stdin().is_terminal();
+    let reloader = server.reloader();
     let shutdown = async move {
-        select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
+        {
+            let mut end = select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv())));
+            loop {
+                tokio::select! {
+                    _ = &mut end => break,
+                    _ = hangup.recv() => {
+                        if has_terminal {
+                            break;
+                        }
+                        rereading.reread();
+                        reloader.reload();
+                    }
+                }
+            }
+        }
         tokio::spawn(async move {
             select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
             tracing::warn!("a second signal: ending at once");
@@ -168,11 +218,13 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
     };
     for listener in &listeners {
         let address = listener.address()?;
-        tracing::info!(%address, workers = config.workers, "serving");
+        let tls = config.tls.is_some() && matches!(address, ListenAddress::Tcp(_));
+        tracing::info!(%address, workers = config.workers, tls, "serving");
         if let ListenAddress::Tcp(address) = address
             && config.viewer
         {
-            tracing::info!("the viewer is at http://{address}/");
+            let scheme = if tls { "https" } else { "http" };
+            tracing::info!("the viewer is at {scheme}://{address}/");
         }
     }
     let server = match &config.metrics_listen {
@@ -189,8 +241,41 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
     Ok(())
 }
 
-fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
-    let filtered = tracing_subscriber::registry().with(config.log.parse::<Targets>()?);
+/// Reads the configuration of a running server again.
+struct Rereading<'f> {
+    flags: &'f Flags,
+    /// The values in force.
+    values: RawConfig,
+    log_filter: LogFilter,
+}
+
+type LogFilter = reload::Handle<Targets, Registry>;
+
+impl Rereading<'_> {
+    /// Applies what may change while the server runs, and logs what came of it.
+    fn reread(&mut self) {
+        let read = configuration(self.flags);
+        let Ok((values, config)) = read.inspect_err(|error| {
+            tracing::error!(%error, "the configuration stays as it was");
+        }) else {
+            return;
+        };
+        if values.log != self.values.log
+            && let Ok(filter) = config.log.parse::<Targets>()
+            && self.log_filter.reload(filter).is_ok()
+        {
+            self.values.log.clone_from(&values.log);
+            tracing::info!(log = config.log, "applied a change of the configuration");
+        }
+        for key in self.values.differences(&values) {
+            tracing::warn!(key, "a change of the configuration needs a restart");
+        }
+    }
+}
+
+fn start_log(config: &Config) -> Result<LogFilter, Box<dyn std::error::Error>> {
+    let (filter, handle) = reload::Layer::new(config.log.parse::<Targets>()?);
+    let filtered = tracing_subscriber::registry().with(filter);
     let is_terminal = io::stderr().is_terminal();
     let log = fmt::layer()
         .with_ansi(is_terminal)
@@ -202,5 +287,5 @@ fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
         LogFormat::Json => filtered.with(log.json().flatten_event(true)).init(),
     }
     std::panic::set_hook(Box::new(|panic| tracing::error!(%panic, "panic")));
-    Ok(())
+    Ok(handle)
 }

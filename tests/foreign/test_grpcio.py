@@ -5,6 +5,7 @@ import hashlib
 import json
 import math
 import struct
+import subprocess
 import time
 import uuid
 
@@ -16,7 +17,7 @@ from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
 from grpc_status import rpc_status
 
-from conftest import ROOT
+from conftest import ROOT, start_server, stop_server
 
 from grasp.v1 import error_reason_pb2, grasp_pb2, grasp_service_pb2, grasp_service_pb2_grpc, hand_rig_service_pb2
 from grasp.v1 import hand_rig_service_pb2_grpc, holdout_pb2, object_service_pb2, object_service_pb2_grpc, search_pb2
@@ -370,3 +371,41 @@ def test_posed_nodes_are_where_the_answered_joints_are(created, channel):
         local = position(pose.position) if pose.HasField("position") else nodes[name]["translation"]
         placed = [a + b for a, b in zip(position(root.position), rotated(root.orientation, local))]
         assert math.dist(placed, position(joint.pose.position)) < 5e-4, name
+
+
+@pytest.fixture
+def secrets(tmp_path):
+    """A certificate of this machine with its key, and a token with its file."""
+    pair = ["-keyout", tmp_path / "server.key", "-out", tmp_path / "server.pem"]
+    names = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
+    new = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "90"]
+    try:
+        subprocess.run([*new, *pair, *names], check=True, capture_output=True)
+    except FileNotFoundError:
+        pytest.skip("there is no openssl to make a certificate")
+    server = ROOT / "target/release/grasp-server"
+    made = subprocess.run([server, "--new-token", "foreign"], check=True, capture_output=True, text=True)
+    (tmp_path / "tokens.toml").write_text(made.stdout)
+    return tmp_path, made.stderr.strip()
+
+
+def test_a_token_over_tls(secrets):
+    folder, token = secrets
+    files = {"certificate": "server.pem", "key": "server.key"}
+    flags = [flag for key, name in files.items() for flag in (f"--tls-{key}", str(folder / name))]
+    process, address = start_server("--listen", "127.0.0.1:0", *flags, "--tokens-file", str(folder / "tokens.toml"))
+    encrypted = grpc.ssl_channel_credentials((folder / "server.pem").read_bytes())
+    request = object_service_pb2.GetObjectRequest(name="objects/remote")
+    with grpc.secure_channel(address, encrypted) as channel:
+        health = health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest())
+        assert health.status == health_pb2.HealthCheckResponse.SERVING
+        with pytest.raises(grpc.RpcError) as caught:
+            object_service_pb2_grpc.ObjectServiceStub(channel).GetObject(request)
+        assert caught.value.code() == grpc.StatusCode.UNAUTHENTICATED
+        assert details(caught.value, error_details_pb2.ErrorInfo)[0].reason == "TOKEN_MISSING"
+    known = grpc.composite_channel_credentials(encrypted, grpc.access_token_call_credentials(token))
+    with grpc.secure_channel(address, known) as channel:
+        objects = object_service_pb2_grpc.ObjectServiceStub(channel)
+        assert objects.GetObject(request).owner == ""
+        assert objects.CreateObject(box("owned")).owner == "foreign"
+    stop_server(process)

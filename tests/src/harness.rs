@@ -7,7 +7,7 @@ use grasp_proto::v1::{
     self, grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
     object_service_client::ObjectServiceClient,
 };
-use grasp_server::{Config, Gauges, ServeError, Server, config::StorePlace};
+use grasp_server::{Config, FaultPoint, Gauges, Reloader, ServeError, Server, config::StorePlace};
 use grasp_synthesis::base::pose::Pose;
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
@@ -24,8 +24,10 @@ const WORKERS: usize = 2;
 #[derive(Debug)]
 pub struct TestServer {
     address: SocketAddr,
+    scheme: &'static str,
     monitor: SocketAddr,
     gauges: Gauges,
+    reloader: Reloader,
     stop: DropGuard,
     serving: JoinHandle<Result<(), ServeError>>,
 }
@@ -43,6 +45,22 @@ impl TestServer {
 
     /// Starts a server on another address of this machine.
     pub async fn start_on(address: IpAddr, adapt: impl FnOnce(&mut Config)) -> Self {
+        Self::start_faulty_on(address, adapt, |_| {}).await
+    }
+
+    /// The same as [`Self::start_with`], with a hook that injects faults.
+    pub async fn start_faulty(
+        adapt: impl FnOnce(&mut Config),
+        hook: impl Fn(FaultPoint) + Send + Sync + 'static,
+    ) -> Self {
+        Self::start_faulty_on(Ipv6Addr::LOCALHOST.into(), adapt, hook).await
+    }
+
+    async fn start_faulty_on(
+        address: IpAddr,
+        adapt: impl FnOnce(&mut Config),
+        hook: impl Fn(FaultPoint) + Send + Sync + 'static,
+    ) -> Self {
         let mut config = Config {
             workers: WORKERS.try_into().expect("there are workers"),
             builder_threads: 0,
@@ -50,17 +68,21 @@ impl TestServer {
             ..Config::default()
         };
         adapt(&mut config);
+        let scheme = if config.tls.is_some() { "https" } else { "http" };
         let (listener, address) = listen(address).await;
         let (monitor_listener, monitor) = listen(Ipv6Addr::LOCALHOST.into()).await;
         let server = Server::new(config).expect("the server starts");
+        server.inject_faults(hook);
         let server = server.monitored_on(monitor_listener.into());
-        let gauges = server.gauges();
+        let (gauges, reloader) = (server.gauges(), server.reloader());
         let stop = CancellationToken::new();
         let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));
         Self {
             address,
+            scheme,
             monitor,
             gauges,
+            reloader,
             stop: stop.drop_guard(),
             serving,
         }
@@ -80,12 +102,17 @@ impl TestServer {
 
     /// The address as a client's endpoint.
     pub fn endpoint(&self) -> String {
-        format!("http://{}", self.address)
+        format!("{}://{}", self.scheme, self.address)
     }
 
     /// Its gauges.
     pub fn gauges(&self) -> &Gauges {
         &self.gauges
+    }
+
+    /// What makes it read its certificates again.
+    pub fn reloader(&self) -> &Reloader {
+        &self.reloader
     }
 
     /// A new connection.
@@ -101,8 +128,8 @@ impl TestServer {
     pub async fn channel_from(&self, address: IpAddr) -> Channel {
         let endpoint = Endpoint::from_shared(self.endpoint());
         let endpoint = endpoint.expect("an address is a valid endpoint");
-        let connecting = endpoint.local_address(Some(address)).connect();
-        connecting.await.expect("the server accepts connections")
+        let endpoint = endpoint.local_address(Some(address));
+        endpoint.connect().await.expect("the server accepts connections")
     }
 
     /// The project's own client, on a new connection.

@@ -1,7 +1,8 @@
-//! Shared by integration tests, benches and promises: a server inside the process, a client by hand, attacks, recorded hands, placed
-//! givers, and random holdouts.
+//! Shared by integration tests, benches and promises: a server inside the process, its certificates, a client by hand, attacks,
+//! recorded hands, placed givers, and random holdouts.
 
 pub mod attacks;
+pub mod certificates;
 mod harness;
 pub mod random_holdouts;
 pub mod raw;

@@ -26,6 +26,7 @@ impl From<ClientError> for Failure {
     fn from(error: ClientError) -> Self {
         let (exit_code, kind) = match &error {
             ClientError::Endpoint { .. } => (2, "endpoint"),
+            ClientError::Token => (2, "token"),
             ClientError::Connect { .. } => (5, "connect"),
             ClientError::Malformed(_) => (1, "malformed_answer"),
             ClientError::Call(call) => match call.code {
@@ -33,7 +34,9 @@ impl From<ClientError> for Failure {
                 | Code::NotFound
                 | Code::AlreadyExists
                 | Code::FailedPrecondition
-                | Code::Aborted => (4, code_name(call.code)),
+                | Code::Aborted
+                | Code::Unauthenticated
+                | Code::PermissionDenied => (4, code_name(call.code)),
                 Code::Unavailable | Code::ResourceExhausted | Code::DeadlineExceeded => {
                     (5, code_name(call.code))
                 }

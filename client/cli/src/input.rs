@@ -1,6 +1,7 @@
 //! Input: options, files and standard input.
 
 use std::{
+    env,
     io::Read as _,
     path::{Path, PathBuf},
     time::Duration,
@@ -13,7 +14,7 @@ use clap::{
 use glam::Vec3;
 use grasp_assets::holdouts::{BuiltInHoldout, holdout, holdouts};
 use grasp_client::{
-    ClientError, GraspClient, Handedness, RetryPolicy, Strategy,
+    GraspClient, Handedness, RetryPolicy, Strategy,
     built_in::request_for,
     json::{JsonError, from_json},
     v1,
@@ -121,6 +122,30 @@ pub(crate) struct ServerOptions {
         default_value = "http://[::1]:50051"
     )]
     server: String,
+    /// File with the token to send, for servers that demand one [default: the variable `GRASP_TOKEN`, which has the token itself].
+    #[arg(long, global = true, value_name = "FILE", env = "GRASP_TOKEN_FILE")]
+    token_file: Option<PathBuf>,
+    /// File with the certificate of the authority to trust, in PEM [default: those of the system].
+    #[arg(long, global = true, value_name = "FILE", env = "GRASP_TLS_CA")]
+    tls_ca: Option<PathBuf>,
+    /// File with a certificate to show to the server, in PEM.
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILE",
+        env = "GRASP_CLIENT_CERTIFICATE",
+        requires = "client_key"
+    )]
+    client_certificate: Option<PathBuf>,
+    /// File with the key of that certificate, in PEM.
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILE",
+        env = "GRASP_CLIENT_KEY",
+        requires = "client_certificate"
+    )]
+    client_key: Option<PathBuf>,
     /// Time limit for connecting.
     #[arg(long, global = true, value_name = "DURATION", default_value = "5s", value_parser = parse_duration)]
     connect_timeout: Duration,
@@ -134,16 +159,28 @@ pub(crate) struct ServerOptions {
 }
 
 impl ServerOptions {
-    pub(crate) async fn connect(&self) -> Result<GraspClient, ClientError> {
-        GraspClient::builder(&self.server)
+    pub(crate) async fn connect(&self) -> Result<GraspClient, Failure> {
+        let mut builder = GraspClient::builder(&self.server)
             .connect_timeout(self.connect_timeout)
             .call_timeout(self.timeout)
             .retry(RetryPolicy {
                 max_attempts: self.tries,
                 ..RetryPolicy::default()
-            })
-            .connect()
-            .await
+            });
+        let token = match &self.token_file {
+            Some(path) => Some(String::from_utf8_lossy(&read_file(path)?).into_owned()),
+            None => env::var("GRASP_TOKEN").ok(),
+        };
+        if let Some(token) = token {
+            builder = builder.token(token.trim())?;
+        }
+        if let Some(path) = &self.tls_ca {
+            builder = builder.ca_certificate(read_file(path)?);
+        }
+        if let (Some(certificate), Some(key)) = (&self.client_certificate, &self.client_key) {
+            builder = builder.client_certificate(read_file(certificate)?, read_file(key)?);
+        }
+        Ok(builder.connect().await?)
     }
 }
 

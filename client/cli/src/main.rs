@@ -37,7 +37,7 @@ Exit codes:
     1  any other error, such as a file that cannot be read
     2  usage: unknown options, values or names, or a malformed request file
     3  no grasp within the budget; for validate: the grasp is not valid; for bake: an object that no hand takes
-    4  rejected by the server: invalid, not found, already exists, read-only, or changed meanwhile
+    4  rejected by the server: invalid, not found, already exists, read-only, changed meanwhile, or not permitted
     5  no answer: the server is unreachable, not serving, or too slow
   130  interrupted";
 

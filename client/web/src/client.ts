@@ -1,6 +1,6 @@
 /** Clients of a server, and its errors. */
 
-import { Code, createClient, ConnectError, type Client } from "@connectrpc/connect";
+import { Code, createClient, ConnectError, type Client, type Interceptor } from "@connectrpc/connect";
 import { createConnectTransport } from "@connectrpc/connect-web";
 import { BadRequestSchema, ErrorInfoSchema, RetryInfoSchema, type BadRequest_FieldViolation } from "./gen/google/rpc/error_details_pb.js";
 import { GraspService } from "./gen/grasp/v1/grasp_service_pb.js";
@@ -17,9 +17,18 @@ export interface GraspClient {
   rigs: Client<typeof HandRigService>;
 }
 
-/** The client of the server at a URL, such as "http://localhost:50051". Calls reject with a `ConnectError`. */
-export function createGraspClient(baseUrl: string): GraspClient {
-  const transport = createConnectTransport({ baseUrl });
+/**
+ * The client of the server at a URL, such as "http://localhost:50051", with a token if the server wants one. Calls reject with a
+ * `ConnectError`.
+ */
+export function createGraspClient(baseUrl: string, token?: string): GraspClient {
+  const authorize: Interceptor = (next) => (request) => {
+    if (token !== undefined) {
+      request.header.set("authorization", `Bearer ${token}`);
+    }
+    return next(request);
+  };
+  const transport = createConnectTransport({ baseUrl, interceptors: [authorize] });
   return {
     grasps: createClient(GraspService, transport),
     objects: createClient(ObjectService, transport),

@@ -34,7 +34,17 @@ struct JobState<C> {
     /// Where its thread waits for a turn.
     news: Arc<Condvar>,
     is_done: bool,
+    /// When its turn began, if it has one.
+    turn_since: Option<Instant>,
     cost: Duration,
+}
+
+impl<C: Client> JobState<C> {
+    fn end_turn(&mut self, turns: &mut Turns<C>) {
+        if let Some(since) = self.turn_since.take() {
+            self.cost += turns.end(&self.ticket, since.elapsed());
+        }
+    }
 }
 
 /// A job from its admission until this is dropped.
@@ -43,13 +53,6 @@ pub struct Job<C: Client> {
     gate: Gate<C>,
     number: u64,
     is_cancelled: AtomicBool,
-}
-
-/// A job's turn at the workers, until it is dropped.
-#[derive(Debug)]
-pub struct Turn<'a, C: Client> {
-    job: &'a Job<C>,
-    begun: Instant,
 }
 
 /// A job that would be too late.
@@ -96,6 +99,7 @@ impl<C: Client> Gate<C> {
             ticket,
             news: Arc::new(Condvar::new()),
             is_done: false,
+            turn_since: None,
             cost: Duration::ZERO,
         };
         state.jobs.insert(number, job);
@@ -118,30 +122,47 @@ impl<C: Client> Job<C> {
         }
     }
 
-    /// Waits for a turn on this thread. `None` once the job is cancelled or due.
-    pub fn turn(&self) -> Option<Turn<'_, C>> {
+    /// Waits for its next turn on this thread, for no longer than `longest`. The one that it has ends, but it keeps the workers if nobody
+    /// comes before it. False if there was none in time, or once it is cancelled or due.
+    pub fn next_turn(&self, longest: Option<Duration>) -> bool {
+        let latest = longest.map(|longest| Instant::now() + longest);
         let mut state = locked(&self.gate.0);
-        let job = state.jobs.get(&self.number)?;
+        let state_of_gate = &mut *state;
+        let Some(job) = state_of_gate.jobs.get_mut(&self.number) else {
+            return false;
+        };
         let (ticket, news) = (job.ticket.clone(), Arc::clone(&job.news));
-        state.turns.wait(&ticket);
+        state_of_gate.turns.wait(&ticket);
+        job.end_turn(&mut state_of_gate.turns);
         state.wake();
         loop {
             let now = Instant::now();
-            let left = ticket.due().saturating_duration_since(now);
+            let latest = latest.map_or(ticket.due(), |latest| latest.min(ticket.due()));
+            let left = latest.saturating_duration_since(now);
             if self.is_cancelled() || left.is_zero() {
                 state.turns.leave(&ticket);
                 state.wake();
-                return None;
+                return false;
             }
             if state.turns.begin(&ticket) {
-                return Some(Turn {
-                    job: self,
-                    begun: now,
-                });
+                if let Some(job) = state.jobs.get_mut(&self.number) {
+                    job.turn_since = Some(now);
+                }
+                return true;
             }
             let waited = news.wait_timeout(state, left);
             (state, _) = waited.unwrap_or_else(std::sync::PoisonError::into_inner);
         }
+    }
+
+    /// Ends its turn, if it has one.
+    pub fn end_turn(&self) {
+        let mut state = locked(&self.gate.0);
+        let State { turns, jobs } = &mut *state;
+        if let Some(job) = jobs.get_mut(&self.number) {
+            job.end_turn(turns);
+        }
+        state.wake();
     }
 
     /// Ends its wait for a turn, and gives it no other one.
@@ -166,22 +187,12 @@ impl<C: Client> Job<C> {
     }
 }
 
-impl<C: Client> Drop for Turn<'_, C> {
-    fn drop(&mut self) {
-        let mut state = locked(&self.job.gate.0);
-        let State { turns, jobs } = &mut *state;
-        if let Some(job) = jobs.get_mut(&self.job.number) {
-            job.cost += turns.end(&job.ticket, self.begun.elapsed());
-        }
-        state.wake();
-    }
-}
-
 impl<C: Client> Drop for Job<C> {
     fn drop(&mut self) {
         let mut state = locked(&self.gate.0);
         let State { turns, jobs } = &mut *state;
-        if let Some(job) = jobs.remove(&self.number) {
+        if let Some(mut job) = jobs.remove(&self.number) {
+            job.end_turn(turns);
             let cost = match (job.ticket.due() <= Instant::now(), job.is_done) {
                 (true, _) => Cost::AtLeast(job.cost),
                 (false, true) => Cost::Whole(job.cost),
@@ -215,11 +226,12 @@ mod tests {
                 let (cancelled, running) = (Arc::clone(&job), Arc::clone(&running));
                 let work = thread::spawn(move || {
                     for _ in 0..2 {
-                        let Some(turn) = job.turn() else { break };
+                        if !job.next_turn(None) {
+                            break;
+                        }
                         assert!(running.fetch_add(1, Ordering::SeqCst) < 2);
                         thread::yield_now();
                         running.fetch_sub(1, Ordering::SeqCst);
-                        drop(turn);
                     }
                     job.done();
                 });
@@ -260,9 +272,9 @@ mod tests {
         let now = Instant::now();
         for _ in 0..100 {
             let job = gate.admit("a", now, now + FAR).unwrap();
-            let turn = job.turn();
+            assert!(job.next_turn(None));
             thread::sleep(Duration::from_millis(1));
-            drop(turn);
+            job.end_turn();
             job.done();
         }
         let at_once = gate.admit("a", now, now).unwrap();

@@ -7,7 +7,7 @@ mod gate;
 mod places;
 mod turns;
 
-pub use gate::{Gate, Job, TooLate, Turn};
+pub use gate::{Gate, Job, TooLate};
 pub use places::{Full, Place, Places, may_hold_another};
 
 /// Locks as the tests of orders need them.

@@ -25,7 +25,7 @@ use grasp_synthesis::{
 use super::hand_label;
 use crate::{
     objects::StoredObject,
-    saved::{create_private, make_private},
+    saved::{create_private, write_private},
 };
 
 /// Largest total size of all files, in bytes: 15,000 complete atlases. It keeps clients that create ever more objects from
@@ -46,18 +46,14 @@ const KEY_DIGITS: usize = 32;
 pub(crate) struct AtlasFiles {
     folder: PathBuf,
     most_bytes: u64,
-    /// True if only this user may read its files.
-    is_private: bool,
 }
 
 impl AtlasFiles {
-    /// Opens the folder, creating it if necessary, and removes unfinished files that a crash left in it. If `is_private`, it and its
-    /// files are this user's only.
-    pub(crate) fn open(folder: PathBuf, is_private: bool) -> io::Result<Self> {
-        if is_private {
+    /// Opens the folder, and removes unfinished files that a crash left in it. A missing one is created for this user only, as files
+    /// are in any case; others may have been given access to one that exists.
+    pub(crate) fn open(folder: PathBuf) -> io::Result<Self> {
+        if !folder.is_dir() {
             create_private(&folder)?;
-        } else {
-            fs::create_dir_all(&folder)?;
         }
         if let Err(error) = remove_unfinished(&folder) {
             let folder = folder.display();
@@ -66,7 +62,6 @@ impl AtlasFiles {
         Ok(Self {
             folder,
             most_bytes: MAX_BYTES,
-            is_private,
         })
     }
 
@@ -121,23 +116,18 @@ impl AtlasFiles {
     }
 
     fn replace(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
-        let written = self.write_whole(path, bytes);
+        let written = Self::write_whole(path, bytes);
         if written.is_err() {
             // Another server that shares the folder started just now, and took the file for one that a crash left.
-            self.write_whole(path, bytes)?;
+            Self::write_whole(path, bytes)?;
         }
         self.make_room(path)
     }
 
     /// Writes a file under the name of an unfinished one, and gives it its final name.
-    fn write_whole(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
+    fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let part = part_of(path);
-        let written = fs::write(&part, bytes).and_then(|()| {
-            if self.is_private {
-                make_private(&part);
-            }
-            fs::rename(&part, path)
-        });
+        let written = write_private(&part, bytes).and_then(|()| fs::rename(&part, path));
         written.inspect_err(|_| _ = fs::remove_file(&part))
     }
 
@@ -265,6 +255,11 @@ mod tests {
         assert_eq!(names.len(), 1, "{names:?}");
         let path = folder.0.join(&names[0]);
         assert_eq!(path.extension(), Some(EXTENSION.as_ref()));
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        }
         assert!(is_part_file(&part_of(&path)), "{:?}", part_of(&path));
         let whole = fs::read(&path).unwrap();
         for broken in [&whole[..whole.len() / 2], b"", &[&whole[..], b"more"].concat()] {

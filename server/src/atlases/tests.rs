@@ -75,7 +75,7 @@ impl Folder {
     }
 
     pub(super) fn open(&self) -> AtlasFiles {
-        AtlasFiles::open(self.0.clone(), false).unwrap()
+        AtlasFiles::open(self.0.clone()).unwrap()
     }
 
     pub(super) fn names(&self) -> Vec<String> {

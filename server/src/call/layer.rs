@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use http::{Request, Response};
+use http::{Request, Response, header};
 use tokio::sync::{Semaphore, watch};
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, body::Body, server::NamedService};
@@ -16,10 +16,12 @@ use super::{
     CallContext, LOGGED_PACKAGE, OpenCall,
     ending::ended_by,
     packing::{accepts_gzip, packing},
+    panics::contained,
     reads::{Reads, is_read},
     upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
 use crate::{
+    access::Door,
     budget::DeadlineReserve,
     client::Client,
     error::{ServiceError, blame_client},
@@ -68,6 +70,8 @@ pub(crate) fn is_upload(path: &str) -> bool {
 /// Wraps every service; see the module documentation.
 #[derive(Clone, Debug)]
 pub(crate) struct Calls {
+    /// Lets calls in.
+    pub door: Arc<Door>,
     pub metrics: Arc<Metrics>,
     pub traces: Traces,
     /// Has a receiver per call in flight.
@@ -104,7 +108,8 @@ impl Calls {
         let client = &context.client;
         if SEARCH_METHODS.contains(&path) {
             let due = context.latest_end(self.longest_search);
-            let admission = self.executor.admit(client, due)?;
+            let own = context.caller.take_search()?;
+            let admission = self.executor.admit(client, due)?.within(own);
             *locked(&context.record.admission) = Some(admission);
         }
         is_read(path).then(|| self.reads.enter(client)).transpose()
@@ -133,8 +138,11 @@ impl Middleware<Body> for Calls {
         let client = reader
             .as_ref()
             .map_or(Client::Local, |reader| reader.client.clone());
-        let context = CallContext::arriving(request.headers(), client, &self.metrics);
+        let mut context = CallContext::arriving(request.headers(), client, &self.metrics);
         let path = request.uri().path();
+        let peer = reader.as_ref().and_then(|reader| reader.peer.get());
+        let admitted = self.door.admit(path, request.headers(), peer);
+        let admitted = admitted.map(|caller| context.identify(caller));
         let mut call = OpenCall::new(
             path,
             context.clone(),
@@ -142,6 +150,12 @@ impl Middleware<Body> for Calls {
             &self.reserve,
             &self.traces,
         );
+        if let Err(error) = admitted {
+            return Box::pin(std::future::ready(Ok(call.answer(refusal(error)))));
+        }
+        // No handler needs it.
+        request.headers_mut().remove(header::AUTHORIZATION);
+        let path = request.uri().path();
         let place = match reader.as_ref().map(|reader| reader.begin_call()).transpose() {
             Ok(place) => place,
             Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
@@ -169,7 +183,7 @@ impl Middleware<Body> for Calls {
             let grace = self.upload_grace;
             request = request.map(|body| bounded_upload(body, permit, grace));
         }
-        let answer = next(request);
+        let answer = contained(next(request), self.executor.faults.clone());
         let (packers, reads) = (Arc::clone(&self.packers), Arc::clone(&self.reads));
         let drained = self.drained.clone();
         let answer = async move {

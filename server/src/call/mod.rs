@@ -6,6 +6,7 @@
 mod ending;
 mod layer;
 mod packing;
+mod panics;
 mod reads;
 mod request_id;
 mod upload;
@@ -30,6 +31,7 @@ pub(crate) use self::{
     upload::UploadPermit,
 };
 use crate::{
+    access::Caller,
     budget::{DeadlineReserve, parse_grpc_timeout},
     client::Client,
     error::add_request_id,
@@ -52,6 +54,7 @@ pub(crate) struct CallContext {
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
     pub client: Client,
+    pub caller: Caller,
     metrics: Arc<Metrics>,
     /// The header with the span of the caller.
     traceparent: Option<HeaderValue>,
@@ -101,6 +104,7 @@ impl CallContext {
             arrived,
             deadline: self.deadline,
             client: self.client.clone(),
+            caller: self.caller.clone(),
             metrics: Arc::clone(&self.metrics),
             traceparent: None,
             record: Arc::default(),
@@ -117,10 +121,19 @@ impl CallContext {
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
             client,
+            caller: Caller::default(),
             metrics: Arc::clone(metrics),
             traceparent: headers.get("traceparent").cloned(),
             record: Arc::default(),
         }
+    }
+
+    /// Makes it the call of a client that a token or certificate names.
+    fn identify(&mut self, caller: Caller) {
+        if let Some(name) = caller.name() {
+            self.client = Client::Named(Arc::clone(name));
+        }
+        self.caller = caller;
     }
 
     pub(crate) fn request_id(&self) -> &str {

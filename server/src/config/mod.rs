@@ -1,5 +1,6 @@
 //! The server's configuration: checked values and their sources.
 
+mod check;
 mod raw;
 
 use std::{fmt, num::NonZeroUsize, path::PathBuf, time::Duration};
@@ -14,6 +15,7 @@ use crate::{
     budget::BudgetLimits,
     limits::{StoreLimits, StreamLimits},
     listen::ListenAddress,
+    tls::TlsFiles,
     web::WebOrigins,
 };
 
@@ -43,6 +45,12 @@ impl fmt::Display for LogFormat {
 pub struct Config {
     /// Addresses to listen on, at least one. `run` ignores them and takes a listener.
     pub listen: Vec<ListenAddress>,
+    /// Certificates, with which connections of TCP are encrypted. `None` for connections in the clear.
+    pub tls: Option<TlsFiles>,
+    /// File of the tokens that calls need. `None` if they need none.
+    pub tokens_file: Option<PathBuf>,
+    /// Lets anyone call who can reach an address of another interface than loopback, in the clear.
+    pub insecure_public: bool,
     /// Number of search threads. More find grasps sooner, up to the number of cores.
     pub workers: NonZeroUsize,
     /// Number of threads of the binary's async runtime.
@@ -112,6 +120,9 @@ impl Default for Config {
         let non_zero = |n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN);
         Self {
             listen: vec![ListenAddress::DEFAULT],
+            tls: None,
+            tokens_file: None,
+            insecure_public: false,
             workers: cores,
             // Messages are small: a thread serves thousands of calls per second.
             io_threads: non_zero((cores.get() / 8).max(2)),
@@ -169,7 +180,8 @@ impl Config {
     }
 
     /// Most threads besides those that search, build atlases and handle requests: one per search, upload and message being packed,
-    /// two per preparation, one for a deletion or preparation ahead of calls, and those that load saved objects or wait for the
+    /// two per preparation, one for a deletion or preparation ahead of calls, one that reads
+    /// changed settings, and those that load saved objects or wait for the
     /// disk.
     pub fn blocking_threads(&self) -> usize {
         let uploads = self.maximum_uploads.get();
@@ -184,6 +196,7 @@ impl Config {
             self.derivations(),
             self.derivations(),
             self.io_threads.get(),
+            1,
             1,
             of_store,
         ];

@@ -1,10 +1,9 @@
 //! The unchecked configuration: flags before environment before file before defaults.
 
 use std::{
-    fmt, fs,
-    ops::RangeInclusive,
+    collections::BTreeSet,
+    fs,
     path::{Path, PathBuf},
-    time::Duration,
 };
 
 use clap::{
@@ -14,7 +13,7 @@ use clap::{
 use grasp_assets::hands::RIG_NAMES;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::{Config, ConfigError, LogFormat, StorePlace};
+use super::{Config, ConfigError, LogFormat, StorePlace, check::Check};
 use crate::{
     limits::MAX_RESPONSE,
     listen::{ListenAddress, NEEDED_LISTEN},
@@ -36,6 +35,27 @@ pub struct RawConfig {
     #[arg(long, env = "GRASP_LISTEN", value_name = "ADDRESS", value_delimiter = ',')]
     #[serde(deserialize_with = "one_or_more", serialize_with = "joined")]
     pub listen: Option<Vec<String>>,
+    /// File with the server's certificate and those between it and its authority, in PEM [default: none].
+    ///
+    /// With it, connections of TCP are encrypted (TLS 1.2 and 1.3). Changed files are taken up while the server runs.
+    #[arg(long, env = "GRASP_TLS_CERTIFICATE", value_name = "FILE", value_parser = any_path())]
+    pub tls_certificate: Option<PathBuf>,
+    /// File with the key of the server's certificate, in PEM [default: none].
+    #[arg(long, env = "GRASP_TLS_KEY", value_name = "FILE", value_parser = any_path())]
+    pub tls_key: Option<PathBuf>,
+    /// File with certificates of authorities in PEM, whose clients are known by their own certificates [default: none].
+    #[arg(long, env = "GRASP_TLS_CLIENT_CA", value_name = "FILE", value_parser = any_path())]
+    pub tls_client_ca: Option<PathBuf>,
+    /// File of the tokens that calls need, without their secrets [default: none].
+    ///
+    /// `--new-token` makes an entry. Changes are taken up while the server runs.
+    #[arg(long, env = "GRASP_TOKENS_FILE", value_name = "FILE", value_parser = any_path())]
+    pub tokens_file: Option<PathBuf>,
+    /// Listen on addresses that other machines may reach although anyone may call there or read along [default: false].
+    ///
+    /// Without it, such addresses need TLS, and tokens or certificates of clients.
+    #[arg(long, env = "GRASP_INSECURE_PUBLIC", value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    pub insecure_public: Option<bool>,
     /// Search threads [default: one per core].
     #[arg(long, env = "GRASP_WORKERS", value_name = "COUNT")]
     pub workers: Option<u64>,
@@ -232,6 +252,15 @@ pub fn unknown_variables(present: impl IntoIterator<Item = String>, known: &[Str
 }
 
 impl RawConfig {
+    /// The keys whose values differ.
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        // Every value can be written as TOML, which leaves absent ones out.
+        let [one, two] = [self, other].map(|values| toml::Table::try_from(values).unwrap_or_default());
+        let keys: BTreeSet<&String> = one.keys().chain(two.keys()).collect();
+        let differing = keys.into_iter().filter(|key| one.get(*key) != two.get(*key));
+        differing.cloned().collect()
+    }
+
     /// Checks every value. Absent ones become those of `fallback`, or else the defaults.
     ///
     /// # Errors
@@ -248,6 +277,15 @@ impl RawConfig {
         }
         let (budgets, streams) = (&mut config.budgets, &mut config.streams);
         read!(addresses(listen => config.listen,));
+        let (mut certificate, mut key, mut client_ca) = (None, None, None);
+        read!(file(tls_certificate => certificate,));
+        read!(file(tls_key => key,));
+        read!(file(tls_client_ca => client_ca,));
+        config.tls = check.tls(certificate, key, client_ca);
+        read!(file(tokens_file => config.tokens_file,));
+        let insecure_public = self.insecure_public.or(fallback.insecure_public);
+        config.insecure_public = insecure_public.unwrap_or(config.insecure_public);
+        self.insecure_public = Some(config.insecure_public);
         read!(number(workers => config.workers, 1..=1024));
         read!(number(io_threads => config.io_threads, 1..=1024));
         read!(time(default_budget_ms => budgets.default, 1..=600_000));
@@ -294,104 +332,12 @@ impl RawConfig {
             let needed = format_args!("at most maximum_budget_ms, {maximum}");
             check.reject("default_budget_ms", default, needed);
         }
+        check.reachable(&config);
         if check.0.is_empty() {
             Ok(config)
         } else {
             Err(ConfigError::BadValues(check.0))
         }
-    }
-}
-
-/// Collects the invalid values. Each method reads a key into a value, which has its default before, and writes it back to the key.
-struct Check(Vec<String>);
-
-impl Check {
-    fn reject(&mut self, key: &str, value: impl fmt::Display, needed: impl fmt::Display) {
-        self.0.push(format!("{key} is {value}; it must be {needed}"));
-    }
-
-    fn number<T: Copy + TryFrom<usize> + Into<usize>>(
-        &mut self,
-        key: &str,
-        raw: &mut Option<u64>,
-        value: &mut T,
-        range: RangeInclusive<u64>,
-    ) {
-        if let Some(number) = *raw {
-            if !range.contains(&number) {
-                self.reject(key, number, format_args!("{} to {}", range.start(), range.end()));
-            } else if let Some(number) = usize::try_from(number)
-                .ok()
-                .and_then(|number| number.try_into().ok())
-            {
-                *value = number;
-            }
-        }
-        *raw = Some((*value).into() as u64);
-    }
-
-    fn time(&mut self, key: &str, raw: &mut Option<u64>, value: &mut Duration, range: RangeInclusive<u64>) {
-        let mut milliseconds = value.as_millis() as usize;
-        self.number(key, raw, &mut milliseconds, range);
-        *value = Duration::from_millis(milliseconds as u64);
-    }
-
-    /// A path that is not empty. The folder itself is opened later.
-    fn folder(&mut self, key: &str, raw: &mut Option<PathBuf>, value: &mut Option<PathBuf>) {
-        if raw.as_ref().is_some_and(|path| path.as_os_str().is_empty()) {
-            self.reject(key, "\"\"", "a folder, or absent");
-        }
-        value.clone_from(raw);
-    }
-
-    /// A text that may be absent.
-    fn optional<T>(
-        &mut self,
-        key: &str,
-        raw: &mut Option<String>,
-        value: &mut Option<T>,
-        needed: &str,
-        parse: impl Fn(&str) -> Option<T>,
-    ) {
-        if let Some(text) = raw {
-            *value = parse(text);
-            if value.is_none() {
-                self.reject(key, format_args!("{text:?}"), needed);
-            }
-        }
-    }
-
-    fn addresses(&mut self, key: &str, raw: &mut Option<Vec<String>>, value: &mut Vec<ListenAddress>) {
-        if let Some(texts) = raw {
-            *value = Vec::new();
-            for text in texts.iter() {
-                match text.trim().parse() {
-                    Ok(address) => value.push(address),
-                    Err(_) => self.reject(key, format_args!("{text:?}"), NEEDED_LISTEN),
-                }
-            }
-            if texts.is_empty() {
-                self.reject(key, "[]", NEEDED_LISTEN);
-            }
-        }
-        *raw = Some(value.iter().map(ToString::to_string).collect());
-    }
-
-    fn text<T: fmt::Display>(
-        &mut self,
-        key: &str,
-        raw: &mut Option<String>,
-        value: &mut T,
-        needed: &str,
-        parse: impl Fn(&str) -> Option<T>,
-    ) {
-        if let Some(text) = raw {
-            match parse(text) {
-                Some(parsed) => *value = parsed,
-                None => self.reject(key, format_args!("{text:?}"), needed),
-            }
-        }
-        *raw = Some(value.to_string());
     }
 }
 
@@ -407,8 +353,10 @@ fn log_format(text: &str) -> Option<LogFormat> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
-    use crate::web::WebOrigins;
+    use crate::{listen::ListenAddress, web::WebOrigins};
 
     #[test]
     fn printed_configuration_can_be_read_and_unknown_keys_are_rejected() {
@@ -444,7 +392,7 @@ mod tests {
     #[test]
     fn reports_every_invalid_value_with_its_key() {
         // Six numbers may be 0.
-        for (number, expected) in [(0, 31), (i64::MAX, 37)] {
+        for (number, expected) in [(0, 35), (i64::MAX, 41)] {
             let mut raw = RawConfig::default();
             raw.complete(RawConfig::default()).unwrap();
             let mut keys = toml::Table::try_from(&raw).unwrap();
@@ -457,8 +405,12 @@ mod tests {
                     _ => "".into(),
                 };
             }
-            keys.insert("objects_directory".to_owned(), "".into());
-            keys.insert("atlas_directory".to_owned(), "".into());
+            let paths = ["objects_directory", "atlas_directory"];
+            let paths =
+                paths
+                    .into_iter()
+                    .chain(["tls_certificate", "tls_key", "tls_client_ca", "tokens_file"]);
+            keys.extend(paths.map(|key| (key.to_owned(), "".into())));
             keys.insert("metrics_listen".to_owned(), "9464".into());
             keys.insert("otlp_endpoint".to_owned(), "localhost:4317".into());
             let mut raw: RawConfig = keys.try_into().unwrap();
@@ -498,6 +450,61 @@ mod tests {
         for wrong in ["[]", "''", "'[::1]:1,'", "['here']"] {
             assert!(listen(&format!("listen = {wrong}")).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn addresses_that_others_may_reach_need_tls_and_known_clients_or_a_word_that_they_do_not() {
+        let complete = |text: &str| {
+            let raw: Result<RawConfig, _> = toml::from_str(&text.replace(';', "\n"));
+            raw.unwrap().complete(RawConfig::default())
+        };
+        let tls = "tls_certificate = 'a'; tls_key = 'b'";
+        for (others, expected) in [
+            ("", Err("TLS")),
+            (tls, Err("knowing its clients")),
+            ("insecure_public = true", Ok(())),
+            ("tokens_file = 'd'", Err("TLS")),
+            (&format!("{tls}; tls_client_ca = 'c'"), Ok(())),
+            (&format!("{tls}; tokens_file = 'd'"), Ok(())),
+        ] {
+            let answer = complete(&format!("listen = '[::1]:1,0.0.0.0:2,192.0.2.1:3'; {others}"));
+            match (answer, expected) {
+                (Ok(_), Ok(())) => {}
+                (Err(error), Err(missing)) => {
+                    let start = "listen is 0.0.0.0:2, 192.0.2.1:3, which other machines may reach, without ";
+                    assert!(
+                        error.to_string().starts_with(&format!("{start}{missing};")),
+                        "{error}"
+                    );
+                }
+                (answer, _) => panic!("{others}: {answer:?}"),
+            }
+            complete(&format!(
+                "listen = '127.0.0.1:1,[::ffff:127.0.0.1]:2,unix:/a'; {others}"
+            ))
+            .unwrap();
+        }
+        let error = complete("tls_key = 'b'").unwrap_err();
+        assert!(
+            error.to_string().starts_with("tls_certificate is absent"),
+            "{error}"
+        );
+        let error = complete("tls_client_ca = 'b'").unwrap_err();
+        assert!(
+            error.to_string().starts_with("tls_certificate is absent"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn changed_keys_are_named() {
+        let mut one = RawConfig::default();
+        one.complete(RawConfig::default()).unwrap();
+        let mut other = one.clone();
+        assert!(one.differences(&other).is_empty());
+        other.log = Some("debug".to_owned());
+        other.objects_directory = Some("/objects".into());
+        assert_eq!(one.differences(&other), ["log", "objects_directory"]);
     }
 
     #[test]

@@ -20,6 +20,7 @@ use super::{
 };
 use crate::{
     call::REQUEST_ID,
+    error::CHALLENGE,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
 
@@ -92,7 +93,10 @@ pub(super) fn failure(status: &Status, format: Format) -> Response<Body> {
 /// An error that is no message of a stream, with a status of HTTP.
 pub(super) fn refusal(http: StatusCode, status: &Status) -> Response<Body> {
     let mut answer = whole(http, "application/json", json(&ErrorBody::from(status)).into());
-    let metadata = status.metadata().clone().into_headers();
+    let mut metadata = status.metadata().clone().into_headers();
+    if let Some(challenge) = metadata.remove(CHALLENGE) {
+        answer.headers_mut().insert(CHALLENGE, challenge);
+    }
     answer.headers_mut().extend(trailing(&metadata));
     answer
 }

@@ -9,7 +9,7 @@ use grasp_proto::v1::ErrorReason;
 use grasp_synthesis::base::stop::Stopped;
 
 pub(crate) use request_info::add_request_id;
-pub(crate) use status::blame_client;
+pub(crate) use status::{CHALLENGE, blame_client};
 use status::{MAX_SUMMARY, clipped_message};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,6 +87,27 @@ impl Limit {
     }
 }
 
+/// A quota of a client.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quota {
+    CallsPerSecond,
+    Searches,
+    Objects,
+    Bytes,
+}
+
+impl Quota {
+    /// Its key in the file of tokens.
+    pub(crate) const fn key(self) -> &'static str {
+        match self {
+            Self::CallsPerSecond => "calls_per_second",
+            Self::Searches => "searches",
+            Self::Objects => "objects",
+            Self::Bytes => "bytes",
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum ServiceError {
     #[error("{}", summary(.0))]
@@ -121,6 +142,10 @@ pub(crate) enum ServiceError {
     RigDamaged { name: String },
     #[error("the server keeps at most {maximum} created rigs; delete one first")]
     RigsFull { maximum: usize },
+    #[error(
+        "this client has {held} of the {maximum} created rigs that the server keeps, its share; delete one first"
+    )]
+    RigShareFull { held: usize, maximum: usize },
     #[error("the server keeps at most {maximum} created objects; delete one first")]
     ObjectsFull { maximum: usize },
     #[error(
@@ -158,6 +183,21 @@ pub(crate) enum ServiceError {
     TookTooLong { limit: Duration },
     #[error("the watcher reads too slowly: it is too many objects behind; watch again")]
     WatcherTooSlow,
+    #[error("the server wants a token in the header authorization: Bearer SECRET")]
+    TokenMissing,
+    #[error("the server does not know the token in the header authorization")]
+    TokenUnknown,
+    #[error("{client} may not make this call: it lacks the scope {scope}")]
+    TokenLacksScope { client: String, scope: String },
+    #[error("{name} belongs to {owner}: only that client may change, delete or feed it")]
+    NotOwner { name: String, owner: String },
+    #[error("this client is at its quota {} ({maximum})", .quota.key())]
+    QuotaExceeded {
+        quota: Quota,
+        maximum: u64,
+        /// When to try again. `None` if the client has to delete something first.
+        retry_after: Option<Duration>,
+    },
     #[error("the server shuts down; call again")]
     ShuttingDown,
     #[error("the deadline passed before the work was done")]

@@ -38,6 +38,18 @@ const ERROR_DOMAIN: &str = "grasp.v1";
 /// Trailer with the delay of a gRPC client's retry policy, in milliseconds.
 const RETRY_PUSHBACK: &str = "grpc-retry-pushback-ms";
 
+/// Header that says how to authenticate (RFC 6750).
+pub(crate) const CHALLENGE: &str = "www-authenticate";
+
+fn challenge(error: &E) -> Option<&'static str> {
+    match error {
+        E::TokenMissing => Some("Bearer realm=\"grasp\""),
+        E::TokenUnknown => Some("Bearer realm=\"grasp\", error=\"invalid_token\""),
+        E::TokenLacksScope { .. } => Some("Bearer realm=\"grasp\", error=\"insufficient_scope\""),
+        _ => None,
+    }
+}
+
 impl From<ServiceError> for Status {
     fn from(error: ServiceError) -> Self {
         let message = clipped_message(&error.to_string(), MAX_MESSAGE);
@@ -59,6 +71,10 @@ impl From<ServiceError> for Status {
             details.set_retry_info(retry_after);
         }
         let mut status = Self::with_error_details(code, message, details);
+        if let Some(challenge) = challenge(&error) {
+            let challenge = MetadataValue::from_static(challenge);
+            status.metadata_mut().insert(CHALLENGE, challenge);
+        }
         if let Some(retry_after) = retry_after {
             let pushback = MetadataValue::from(u64::try_from(retry_after.as_millis()).unwrap_or(u64::MAX));
             status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
@@ -72,6 +88,7 @@ fn retry_after(error: &E) -> Option<Duration> {
     match error {
         E::Overloaded { retry_after, .. } => Some(*retry_after),
         E::WouldMissDeadline { expected } => Some(*expected),
+        E::QuotaExceeded { retry_after, .. } => *retry_after,
         _ => None,
     }
 }
@@ -94,7 +111,7 @@ fn code_and_reason(error: &E) -> (Code, ErrorReason) {
         E::RigExists { .. } => (Code::AlreadyExists, R::RigExists),
         E::RigBuiltIn { .. } => (Code::FailedPrecondition, R::RigBuiltIn),
         E::RigDamaged { .. } => (Code::DataLoss, R::RigDamaged),
-        E::RigsFull { .. } => (Code::ResourceExhausted, R::TooManyRigs),
+        E::RigsFull { .. } | E::RigShareFull { .. } => (Code::ResourceExhausted, R::TooManyRigs),
         E::StoreFailed => (Code::Unavailable, R::StoreFailed),
         E::Overloaded { limit, .. } => (Code::ResourceExhausted, limit.text_and_reason().1),
         E::WouldMissDeadline { .. } => (Code::ResourceExhausted, R::WouldMissDeadline),
@@ -106,6 +123,11 @@ fn code_and_reason(error: &E) -> (Code, ErrorReason) {
         E::TrackNotFound { .. } => (Code::NotFound, R::TrackNotFound),
         E::TrackIdle { .. } => (Code::DeadlineExceeded, R::TrackIdle),
         E::TookTooLong { .. } => (Code::DeadlineExceeded, R::CallTookTooLong),
+        E::TokenMissing => (Code::Unauthenticated, R::TokenMissing),
+        E::TokenUnknown => (Code::Unauthenticated, R::TokenUnknown),
+        E::TokenLacksScope { .. } => (Code::PermissionDenied, R::TokenLacksScope),
+        E::NotOwner { .. } => (Code::PermissionDenied, R::NotOwner),
+        E::QuotaExceeded { .. } => (Code::ResourceExhausted, R::QuotaExceeded),
         E::WatcherTooSlow => (Code::ResourceExhausted, R::WatcherTooSlow),
         E::ShuttingDown => (Code::Unavailable, R::ShuttingDown),
         E::DeadlineExceeded => (Code::DeadlineExceeded, R::DeadlineExceeded),
@@ -126,6 +148,7 @@ fn subject(error: &E) -> Option<(&'static str, &str)> {
             ("grasp/HandRig", name)
         }
         E::TrackNotFound { name } => ("grasp/Track", name),
+        E::NotOwner { name, .. } => ("OWNER", name),
         E::RequestIdReused { name, .. } => ("REQUEST_ID", name),
         E::ObjectReadOnly { name } => ("READ_ONLY", name),
         _ => return None,
@@ -136,9 +159,13 @@ fn metadata(error: &E) -> HashMap<String, String> {
     let other = match error {
         E::RequestIdReused { request_id, .. } => Some(("request_id", request_id.clone())),
         E::ObjectChanged { current, .. } => Some(("etag", current.clone())),
-        E::RigsFull { maximum } | E::ObjectsFull { maximum } | E::Overloaded { maximum, .. } => {
-            Some(("maximum", maximum.to_string()))
-        }
+        E::TokenLacksScope { scope, .. } => Some(("scope", scope.clone())),
+        E::NotOwner { owner, .. } => Some(("owner", owner.clone())),
+        E::QuotaExceeded { quota, .. } => Some(("quota", quota.key().to_owned())),
+        E::RigShareFull { maximum, .. }
+        | E::RigsFull { maximum }
+        | E::ObjectsFull { maximum }
+        | E::Overloaded { maximum, .. } => Some(("maximum", maximum.to_string())),
         _ => None,
     };
     let name = subject(error).map(|(_, name)| ("name", name.to_owned()));
@@ -271,7 +298,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::error::Limit;
+    use crate::error::{Limit, Quota};
 
     #[test]
     fn every_error_has_its_code_and_reason() {
@@ -327,6 +354,34 @@ mod tests {
             (E::RigsFull { maximum: 64 }, 8, "TOO_MANY_RIGS"),
             (E::ObjectsFull { maximum: 9 }, 8, "TOO_MANY_OBJECTS"),
             (E::WatcherTooSlow, 8, "WATCHER_TOO_SLOW"),
+            (E::RigShareFull { held: 5, maximum: 9 }, 8, "TOO_MANY_RIGS"),
+            (E::TokenMissing, 16, "TOKEN_MISSING"),
+            (E::TokenUnknown, 16, "TOKEN_UNKNOWN"),
+            (
+                E::TokenLacksScope {
+                    client: "a".into(),
+                    scope: "find".into(),
+                },
+                7,
+                "TOKEN_LACKS_SCOPE",
+            ),
+            (
+                E::NotOwner {
+                    name: name(),
+                    owner: "a".into(),
+                },
+                7,
+                "NOT_OWNER",
+            ),
+            (
+                E::QuotaExceeded {
+                    quota: Quota::Searches,
+                    maximum: 1,
+                    retry_after: None,
+                },
+                8,
+                "QUOTA_EXCEEDED",
+            ),
             (E::StoreFailed, 14, "STORE_FAILED"),
             (E::ShuttingDown, 14, "SHUTTING_DOWN"),
             (E::DeadlineExceeded, 4, "DEADLINE_EXCEEDED"),

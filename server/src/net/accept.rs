@@ -35,9 +35,10 @@ pub(crate) async fn accept<S: Service>(
             match accept_any(&mut listeners).await {
                 Ok((stream, client)) => {
                     pause = FIRST_PAUSE;
-                    match connections.admit(&client) {
-                        Some(place) => drop(tasks.spawn(serving.clone().serve(stream, place))),
-                        None => tracing::debug!(%client, "refused a connection"),
+                    if let Some(place) = connections.admit(&client) {
+                        tasks.spawn(serving.clone().serve(stream, place));
+                    } else {
+                        tracing::debug!(%client, "refused a connection");
                     }
                 }
                 Err(error) if concerns_one_connection(&error) => {

@@ -31,7 +31,7 @@ impl<B> Middleware<B> for UnreadCount {
         F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
     {
         let reader = request.extensions().get::<Arc<Reader>>().cloned();
-        let open = reader.as_ref().map(|reader| reader.begin_request());
+        let open = reader.as_ref().map(Reader::begin_request);
         let answer = next(request);
         Box::pin(async move {
             let answer = answer.await?;

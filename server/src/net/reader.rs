@@ -25,6 +25,7 @@ use crate::{
     client::Client,
     error::{Limit, ServiceError},
     limits::{MAX_RESPONSE, locked},
+    tls::PeerName,
 };
 
 /// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size.
@@ -70,6 +71,8 @@ pub(crate) struct Reader {
     pub(super) all: Arc<Connections>,
     /// Whose connection it is.
     pub(crate) client: Client,
+    /// The name in the client's certificate, if it has one.
+    pub(crate) peer: PeerName,
     waiting: Mutex<WaitingBytes>,
     /// Bytes of unanswered requests.
     arriving: Mutex<WaitingBytes>,
@@ -169,6 +172,7 @@ impl Reader {
     pub(super) fn new(all: &Arc<Connections>, client: Client, frames: Arc<FrameBudget>) -> Self {
         Self {
             client,
+            peer: PeerName::default(),
             waiting: Mutex::default(),
             arriving: Mutex::default(),
             progress: AtomicU64::new(0),

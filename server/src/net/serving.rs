@@ -16,7 +16,7 @@ use hyper_util::{
     server::conn::auto,
 };
 use tokio::time::Instant;
-use tokio_util::sync::CancellationToken;
+use tokio_util::{either::Either, sync::CancellationToken};
 use tonic::{Status, body::Body};
 use tower::ServiceExt as _;
 
@@ -29,12 +29,13 @@ use super::{
 use crate::{
     listen::Stream,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+    tls::{Tls, TlsStream},
 };
 
 /// Largest headers of a request, in bytes.
 const MAX_HEADERS: usize = 16 << 10;
 
-/// Longest wait for a client's HTTP/2 preface, or as many bytes of a request.
+/// Longest wait for a client's HTTP/2 preface, or as many bytes of a request, with the handshake of TLS.
 const PREFACE_TIME: Duration = Duration::from_secs(5);
 
 /// Largest number of open streams per connection.
@@ -82,6 +83,8 @@ impl<S> Service for S where
 #[derive(Clone, Debug)]
 pub(crate) struct Serving<S> {
     pub service: S,
+    /// Certificates, with which connections of TCP are encrypted.
+    pub tls: Option<Arc<Tls>>,
     pub lifetime: Lifetime,
 }
 
@@ -103,8 +106,16 @@ impl<S: Service> Serving<S> {
     pub(super) async fn serve(self, stream: Stream, place: Admitted) {
         let Self {
             service,
+            tls,
             mut lifetime,
         } = self;
+        let stream = match (tls, stream) {
+            (Some(tls), tcp @ Either::Left(_)) => {
+                Either::Right(TlsStream::new(tls.config(), tcp, Arc::clone(&place.peer)))
+            }
+            // A socket of the file system is private without.
+            (_, stream) => Either::Left(stream),
+        };
         // Of its own, so that connections do not share a lock whenever they are polled.
         for token in [&mut lifetime.stop, &mut lifetime.close] {
             *token = token.child_token();
@@ -121,20 +132,18 @@ impl<S: Service> Serving<S> {
         let io = TokioIo::new(WatchedStream::new(stream, Arc::clone(&place)));
         let transport = transport();
         let mut connection = pin!(transport.serve_connection(io, answering));
-        let mut leaving = pin!(lifetime.until_leaving(&place));
-        loop {
-            tokio::select! {
-                biased;
-                () = lifetime.close.cancelled() => return,
-                () = place.closed() => return,
-                ended = &mut connection => {
-                    if let Err(error) = ended {
-                        tracing::debug!(%error, client = %place.client, "a connection ended with an error");
-                    }
-                    return;
+        let leaving = lifetime.until_leaving(&place);
+        tokio::select! {
+            biased;
+            () = lifetime.close.cancelled() => return,
+            () = place.closed() => return,
+            ended = &mut connection => {
+                if let Err(error) = ended {
+                    tracing::debug!(%error, client = %place.client, "a connection ended with an error");
                 }
-                () = &mut leaving => break,
+                return;
             }
+            () = leaving => {}
         }
         connection.as_mut().graceful_shutdown();
         tokio::select! {

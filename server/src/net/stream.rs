@@ -8,16 +8,20 @@ use std::{
 };
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio_util::either::Either;
 
 use super::{frames::FrameCount, reader::Reader};
-use crate::listen::Stream;
+use crate::{listen::Stream, tls::TlsStream};
+
+/// A stream in the clear, or encrypted.
+type PlainOrTls = Either<Stream, TlsStream<Stream>>;
 
 const PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
 /// A connection's stream. Reading fails once the client has sent more frames than it may.
 #[derive(Debug)]
 pub(super) struct WatchedStream {
-    stream: Stream,
+    stream: PlainOrTls,
     reader: Arc<Reader>,
     protocol: Protocol,
 }
@@ -32,7 +36,7 @@ enum Protocol {
 }
 
 impl WatchedStream {
-    pub(super) fn new(stream: Stream, reader: Arc<Reader>) -> Self {
+    pub(super) fn new(stream: PlainOrTls, reader: Arc<Reader>) -> Self {
         Self {
             stream,
             reader,

@@ -31,6 +31,7 @@ use self::{
     mesh_file::MeshFile,
 };
 use crate::{
+    access::Owner,
     atlas_slots::AtlasSlots,
     validate::{COLLECTION, Labels, Place},
     wire::{hex, wire_pose},
@@ -183,6 +184,7 @@ impl StoredObject {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Record {
     pub labels: Labels,
+    pub owner: Owner,
     pub etag: String,
     pub created: SystemTime,
     /// When a client last changed it; not before `created`.
@@ -264,10 +266,11 @@ impl Listed {
 }
 
 impl Record {
-    /// A message about the object with labels, etag and times.
+    /// A message about the object with labels, owner, etag and times.
     fn described(&self, object: v1::GraspObject) -> v1::GraspObject {
         v1::GraspObject {
             labels: self.labels.clone(),
+            owner: self.owner.to_string(),
             etag: self.etag.clone(),
             create_time: Some(self.created.into()),
             update_time: Some(self.updated.into()),

@@ -14,6 +14,8 @@ use grasp_synthesis::{
     propose::prepared::PreparedRig,
 };
 
+use crate::access::Owner;
+
 /// Prefix of every rig's name.
 pub(crate) const COLLECTION: &str = "rigs/";
 
@@ -45,6 +47,7 @@ pub(crate) struct StoredRig {
     pub id: String,
     /// True if it is part of the server.
     pub built_in: bool,
+    pub owner: Owner,
     /// Left and right hand.
     pub hands: [RigHand; 2],
     /// True for the hand that is the other one's mirror image.

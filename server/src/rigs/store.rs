@@ -8,16 +8,22 @@ use std::{
 };
 
 use bytes::Bytes;
+use grasp_admission::may_hold_another;
 use grasp_assets::hands::{self, RIG_NAMES};
-use grasp_proto::v1;
+use grasp_proto::{has_too_many_parts, v1};
 use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 use object_store::Error;
 use prost::Message;
 
 use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
+    access::{Caller, Owner},
     error::ServiceError,
-    saved::{FieldMove, RIGS, Records, SavedFiles, Unreadable, field, message, move_fields, seal, wait_for},
+    limits::BYTES_BESIDES_MESH,
+    saved::{
+        FieldMove, RIGS, Records, SavedFiles, Unreadable, field, is_decodable, message, move_fields, seal,
+        wait_for,
+    },
 };
 
 /// All rigs.
@@ -38,6 +44,9 @@ pub(crate) struct RigStore {
 
 /// The rigs that clients created by id; `None` if the record is damaged or missing.
 type CreatedRigs = BTreeMap<String, Option<Arc<StoredRig>>>;
+
+/// The id and the rig; `None` if its record is damaged or missing.
+pub(crate) type ListedRig = (String, Option<Arc<StoredRig>>);
 
 impl RigStore {
     /// A store of the built-in rigs that keeps up to `maximum` created ones, which outlast it if they are saved.
@@ -111,16 +120,38 @@ impl RigStore {
         Ok(())
     }
 
+    /// Checks that an owner may have another rig, beside those of others. Everybody's rigs are limited only together.
+    pub(crate) fn check_share(&self, owner: &Owner) -> Result<(), ServiceError> {
+        let created = self.created();
+        let own = created.values().flatten().filter(|rig| rig.owner == *owner);
+        let (held, free) = (own.count(), self.maximum.saturating_sub(created.len()));
+        if owner.is_everybody() || may_hold_another(held, free) {
+            return Ok(());
+        }
+        Err(ServiceError::RigShareFull {
+            held,
+            maximum: self.maximum,
+        })
+    }
+
+    /// Checks that a rig, if it exists, does not belong to another client.
+    pub(crate) fn check_owned(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
+        let created = self.created();
+        let rig = created.get(id).and_then(Option::as_ref);
+        rig.map_or(Ok(()), |rig| caller.check_owns(&rig.name(), &rig.owner))
+    }
+
     /// The records; `None` if rigs are in memory only.
     pub(crate) fn saved(&self) -> Option<&Records> {
         self.saved.as_ref()
     }
 
-    /// The record of the rig that this request makes. `None` if rigs are in memory only.
-    pub(crate) fn record(&self, request: &v1::CreateRigRequest) -> Option<Bytes> {
+    /// The record of the rig that this request of its owner makes. `None` if rigs are in memory only.
+    pub(crate) fn record(&self, request: &v1::CreateRigRequest, owner: &Owner) -> Option<Bytes> {
         let record = |_: &Records| {
             seal(&SavedRig {
                 request: Some(request.clone()),
+                owner: owner.to_string(),
             })
         };
         self.saved.as_ref().map(record)
@@ -134,6 +165,7 @@ impl RigStore {
     ) -> Result<Arc<StoredRig>, ServiceError> {
         let _changing = self.changing();
         self.check_room(&rig.id)?;
+        self.check_share(&rig.owner)?;
         if let Some((saved, record)) = self.saved.as_ref().zip(record) {
             let mut names = self.ids();
             names.push(rig.id.clone());
@@ -173,15 +205,16 @@ impl RigStore {
         Ok(())
     }
 
-    /// Up to `size` rigs ordered by name, starting after `after`, and whether there are more.
-    pub(crate) fn page(&self, after: Option<&str>, size: usize) -> (Vec<Arc<StoredRig>>, bool) {
+    /// Up to `size` rigs ordered by name, starting after `after`, and whether there are more. Of a damaged one, only the id is known.
+    pub(crate) fn page(&self, after: Option<&str>, size: usize) -> (Vec<ListedRig>, bool) {
         let from = (after.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded);
         let created = self.created();
-        let built_in = self.built_in.range::<str, _>(from).map(|(_, rig)| rig);
-        let created = created.range::<str, _>(from).filter_map(|(_, rig)| rig.as_ref());
-        let rigs = built_in.take(size + 1).chain(created.take(size + 1));
-        let mut rigs: Vec<_> = rigs.map(Arc::clone).collect();
-        rigs.sort_by(|a, b| a.id.cmp(&b.id));
+        let built_in = self.built_in.range::<str, _>(from);
+        let built_in = built_in.map(|(id, rig)| (id.clone(), Some(Arc::clone(rig))));
+        let created = created.range::<str, _>(from);
+        let created = created.map(|(id, rig)| (id.clone(), rig.clone()));
+        let mut rigs: Vec<_> = built_in.take(size + 1).chain(created.take(size + 1)).collect();
+        rigs.sort_by(|(a, _), (b, _)| a.cmp(b));
         let more = rigs.len() > size;
         rigs.truncate(size);
         (rigs, more)
@@ -212,28 +245,28 @@ fn built_in(name: &str) -> Option<StoredRig> {
     Some(StoredRig {
         id: name.to_owned(),
         built_in: true,
+        owner: Owner::default(),
         hands: [hand(Handedness::Left)?, hand(Handedness::Right)?],
         mirrored: [true, false],
         warnings: Vec::new(),
     })
 }
 
-/// Largest record in bytes: more than the largest model that a server can be configured to take.
-const MAX_RECORD: u64 = 1 << 30;
-
-pub(crate) fn saved_rigs(files: Arc<SavedFiles>) -> Records {
-    Records::new(files, RIGS, MAX_RECORD)
+/// The records of rigs whose models have up to so many bytes together.
+pub(crate) fn saved_rigs(files: Arc<SavedFiles>, models: usize) -> Records {
+    Records::new(files, RIGS, (models + 2 * BYTES_BESIDES_MESH) as u64)
 }
 
-/// The request that made a rig. The inner error is why its record cannot be read.
+/// The request that made a rig, and its owner. The inner error is why its record cannot be read.
 pub(crate) async fn saved_request(
     rigs: &Records,
     id: &str,
-) -> Result<Result<v1::CreateRigRequest, Unreadable>, Error> {
+) -> Result<Result<(v1::CreateRigRequest, Owner), Unreadable>, Error> {
     let parse = |message: &[u8]| {
         let request = request_of(message).ok_or(Unreadable::Message)?;
         if request.rig_id == id {
-            Ok(request)
+            let owner = SavedRig::decode(message).map(|saved| Owner::named(&saved.owner));
+            Ok((request, owner.unwrap_or_default()))
         } else {
             Err(Unreadable::Name)
         }
@@ -247,7 +280,13 @@ struct SavedRig {
     /// `None` in records of version 0.1.
     #[prost(message, optional, tag = "10")]
     request: Option<v1::CreateRigRequest>,
+    /// The name of the client that created it; empty if it is everybody's.
+    #[prost(string, tag = "11")]
+    owner: String,
 }
+
+/// The number of the request in a record.
+const NOW: usize = 10;
 
 /// The places of a version 0.1 record's fields in a request.
 const REQUEST: &[FieldMove] = &[
@@ -272,10 +311,15 @@ const LIMITS: &[FieldMove] = &[
 ];
 
 fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
+    if !is_decodable::<v1::CreateRigRequest>(record, NOW) {
+        return None;
+    }
     if let Some(request) = SavedRig::decode(record).ok()?.request {
         return Some(request);
     }
-    let mut request = v1::CreateRigRequest::decode(&*move_fields(record, REQUEST)?).ok()?;
+    let request = move_fields(record, REQUEST)
+        .filter(|request| !has_too_many_parts::<v1::CreateRigRequest>(request))?;
+    let mut request = v1::CreateRigRequest::decode(&*request).ok()?;
     for (place, limits) in (1..).zip(&mut request.limits) {
         if limits.digit == 0 {
             limits.digit = place;
@@ -309,8 +353,40 @@ mod tests {
         assert_eq!(store.insert(rig("c"), None).unwrap_err(), full);
         store.delete("a").unwrap();
         store.insert(rig("c"), None).unwrap();
-        let listed: Vec<String> = store.page(None, 10).0.iter().map(|rig| rig.id.clone()).collect();
+        let listed: Vec<String> = store.page(None, 10).0.into_iter().map(|(id, _)| id).collect();
         assert_eq!(listed, ["adult", "b", "c", "thesis"]);
+    }
+
+    #[test]
+    fn an_owner_leaves_room_for_others_and_others_leave_its_rigs_alone() {
+        let store = RigStore::new(16, None);
+        let one = Caller::named("one");
+        let own = |id: String, caller: &Caller| StoredRig {
+            owner: caller.owner(),
+            ..rig(&id)
+        };
+        let fill = |caller: &Caller, name: &str| {
+            let added = |number: &u32| store.insert(own(format!("{name}{number}"), caller), None).is_ok();
+            (0..20).take_while(added).count()
+        };
+        assert_eq!(fill(&one, "one"), 12);
+        assert_eq!(fill(&Caller::named("two"), "two"), 3);
+        let theirs = ServiceError::NotOwner {
+            name: name_of("one0"),
+            owner: "one".to_owned(),
+        };
+        assert_eq!(store.check_owned("one0", &Caller::named("two")), Err(theirs));
+        assert_eq!(store.check_owned("one0", &one), Ok(()));
+        assert_eq!(
+            store.check_owned("one0", &Caller::default()),
+            Ok(()),
+            "without tokens, it is everybody's"
+        );
+        assert_eq!(
+            fill(&Caller::default(), "all"),
+            1,
+            "nothing is kept for others then"
+        );
     }
 
     #[test]

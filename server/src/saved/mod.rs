@@ -1,29 +1,35 @@
 //! The folder or bucket of created objects and rigs: files that are written as a whole and checked when they are read. An object or
 //! rig whose file is damaged or missing stays known by its name, and is back when its file is.
 
+#[cfg_attr(
+    not(feature = "s3"),
+    allow(dead_code, reason = "only buckets have leases; their tests need none")
+)]
+mod lease;
 mod records;
 
 #[cfg(unix)]
-use std::os::unix::fs::{DirBuilderExt as _, PermissionsExt as _};
+use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::{
     collections::HashMap,
     env, fmt,
     fs::{self, DirBuilder, File, TryLockError},
-    io,
+    io::{self, Read as _, Write as _},
     path::{Path, PathBuf},
+    process,
     sync::Arc,
     thread,
     time::{Duration, Instant},
 };
 
 use bytes::Bytes;
-use futures_util::TryStreamExt as _;
 use object_store::{
     Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, local::LocalFileSystem, path::Path as ObjectPath,
 };
 
+use self::lease::Lease;
 pub(crate) use self::records::{
-    FieldMove, NotCreated, Records, Unreadable, field, message, move_fields, seal,
+    FieldMove, NotCreated, Records, Unreadable, field, is_decodable, message, move_fields, seal,
 };
 use crate::error::ServiceError;
 
@@ -43,6 +49,8 @@ const NEEDED: &str = "it must be a folder that only this server writes to, or me
 pub(crate) struct SavedFiles {
     files: Arc<dyn ObjectStore>,
     folder: Option<OwnedFolder>,
+    /// That of a bucket.
+    lease: Option<Arc<Lease>>,
     /// As in the configuration, for messages.
     place: String,
 }
@@ -64,13 +72,13 @@ impl SavedFiles {
             place: place.to_string(),
             reason: reason.to_string(),
         };
-        let (files, folder): (Arc<dyn ObjectStore>, _) = match place {
+        let (files, folder, lease): (Arc<dyn ObjectStore>, _, _) = match place {
             StorePlace::Memory => return Ok(None),
             StorePlace::Folder(path) => {
                 let folder = OwnedFolder::open(path, &[OBJECTS, MESHES, RIGS]);
                 let folder = folder.map_err(|source| error(&format!("{NEEDED}: {source}")))?;
                 let files = LocalFileSystem::new_with_prefix(path).map_err(|source| error(&source))?;
-                (Arc::new(files.with_fsync(true)), Some(folder))
+                (Arc::new(files.with_fsync(true)), Some(folder), None)
             }
             #[cfg(feature = "s3")]
             StorePlace::S3 { bucket, prefix } => {
@@ -78,13 +86,15 @@ impl SavedFiles {
                     .with_bucket_name(bucket)
                     .build()
                     .map_err(|source| error(&source))?;
-                let files = object_store::prefix::PrefixStore::new(files, prefix.as_str());
-                (Arc::new(files), None)
+                let files = Arc::new(object_store::prefix::PrefixStore::new(files, prefix.as_str()));
+                let lease = Lease::new(Arc::clone(&files) as Arc<_>, lease::Times::USUAL);
+                (files, None, Some(lease))
             }
         };
         Ok(Some(Self {
             files,
             folder,
+            lease,
             place: place.to_string(),
         }))
     }
@@ -96,9 +106,41 @@ impl SavedFiles {
         }
     }
 
+    /// Makes this server the only one that uses the bucket; a folder it owns since it was opened.
+    pub(crate) async fn own(&self) -> Result<(), StoreError> {
+        match &self.lease {
+            Some(lease) => lease.take(|reason| self.error(reason)).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Lets another server use the bucket.
+    pub(crate) async fn give_back(&self) {
+        if let Some(lease) = &self.lease {
+            lease.give_back().await;
+        }
+    }
+
+    /// Waits until another server has taken the bucket over, which takes a pause of this one; gives the error.
+    pub(crate) async fn lost(&self) -> StoreError {
+        match &self.lease {
+            Some(lease) => lease.lost().await,
+            None => std::future::pending().await,
+        }
+        self.error(&"another server took it over, because this one could not reach it for too long")
+    }
+
+    /// Changes something, as long as no other server may.
+    async fn change<T>(&self, change: impl Future<Output = Result<T, Error>>) -> Result<T, Error> {
+        match &self.lease {
+            Some(lease) => lease.within(change).await,
+            None => change.await,
+        }
+    }
+
     pub(crate) async fn is_marked(&self, folder: &str) -> Result<bool, Error> {
         let mark = self.read(&ObjectPath::from_iter([folder, MARK]), 0).await?;
-        Ok(mark.is_some())
+        Ok(mark != Err(Unreadable::Missing))
     }
 
     /// Marks a folder, so that another one in its place shows, such as that of a volume that is not mounted.
@@ -112,18 +154,24 @@ impl SavedFiles {
 
     /// The names of the files in a folder, with their sizes.
     pub(crate) async fn list(&self, folder: &str) -> Result<HashMap<String, u64>, Error> {
-        let files = self.files.list(Some(&ObjectPath::from(folder)));
-        let sizes = files.map_ok(|ObjectMeta { location, size, .. }| {
-            (location.filename().unwrap_or_default().to_owned(), size)
-        });
-        let mut sizes: HashMap<String, u64> = sizes.try_collect().await?;
+        let listed = self
+            .files
+            .list_with_delimiter(Some(&ObjectPath::from(folder)))
+            .await?;
+        let sizes = listed
+            .objects
+            .into_iter()
+            .map(|ObjectMeta { location, size, .. }| {
+                (location.filename().unwrap_or_default().to_owned(), size)
+            });
+        let mut sizes: HashMap<String, u64> = sizes.collect();
         sizes.remove(MARK);
         Ok(sizes)
     }
 
     /// Writes a file as a whole: a failure leaves it as it was.
     pub(crate) async fn write(&self, path: &ObjectPath, bytes: Bytes) -> Result<(), Error> {
-        self.files.put(path, bytes.into()).await?;
+        self.change(self.files.put(path, bytes.into())).await?;
         if let Some(folder) = &self.folder {
             make_private(&folder.path.join(path.as_ref()));
         }
@@ -132,7 +180,7 @@ impl SavedFiles {
 
     /// Deletes a file for good; one that is missing counts as deleted.
     pub(crate) async fn delete(&self, path: &ObjectPath) -> Result<(), Error> {
-        match self.files.delete(path).await {
+        match self.change(self.files.delete(path)).await {
             Err(Error::NotFound { .. }) => {}
             result => result?,
         }
@@ -145,16 +193,20 @@ impl SavedFiles {
         })
     }
 
-    /// Reads a file; nothing of it if it has more than `most` bytes. `None` if there is no such file.
-    pub(crate) async fn read(&self, path: &ObjectPath, most: u64) -> Result<Option<Bytes>, Error> {
+    /// Reads a file of at most `most` bytes. The inner error is [`Unreadable::Missing`] or [`Unreadable::Size`].
+    pub(crate) async fn read(
+        &self,
+        path: &ObjectPath,
+        most: u64,
+    ) -> Result<Result<Bytes, Unreadable>, Error> {
         let file = match self.files.get(path).await {
-            Err(Error::NotFound { .. }) => return Ok(None),
+            Err(Error::NotFound { .. }) => return Ok(Err(Unreadable::Missing)),
             file => file?,
         };
         if file.meta.size > most {
-            return Ok(Some(Bytes::new()));
+            return Ok(Err(Unreadable::Size));
         }
-        file.bytes().await.map(Some)
+        file.bytes().await.map(Ok)
     }
 }
 
@@ -217,15 +269,28 @@ impl OwnedFolder {
         for subfolder in subfolders {
             create_private(&path.join(subfolder))?;
         }
-        let lock = File::create(path.join(LOCK))?;
+        // Not cut: it says who uses the folder.
+        let mut opened = File::options();
+        let mut lock = opened
+            .read(true)
+            .append(true)
+            .create(true)
+            .open(path.join(LOCK))?;
         let start = Instant::now();
         while let Err(error) = lock.try_lock() {
             match error {
                 TryLockError::WouldBlock if start.elapsed() < LOCK_WAIT => thread::sleep(LOCK_RETRY),
-                TryLockError::WouldBlock => return Err(io::Error::other("another server uses it")),
+                TryLockError::WouldBlock => {
+                    let mut owner = String::new();
+                    // A damaged file names nobody.
+                    let _ = lock.take(MAX_OWNER).read_to_string(&mut owner);
+                    return Err(io::Error::other(in_use(&owner)));
+                }
                 TryLockError::Error(error) => return Err(error),
             }
         }
+        lock.set_len(0)?;
+        lock.write_all(this_process().as_bytes())?;
         let folder = Self {
             path: path.to_owned(),
             _lock: lock,
@@ -263,6 +328,26 @@ impl OwnedFolder {
     }
 }
 
+/// Longest name of the process that uses a store, in bytes.
+const MAX_OWNER: u64 = 300;
+
+/// This process, for people who look for the one that uses a store.
+fn this_process() -> String {
+    let process = process::id();
+    match fs::read_to_string("/proc/sys/kernel/hostname") {
+        Ok(host) => format!("process {process} on host {}", host.trim()),
+        Err(_) => format!("process {process}"),
+    }
+}
+
+/// The reason not to use a store of which `owner` is the [`this_process`] of another server, or empty.
+fn in_use(owner: &str) -> String {
+    match owner.trim() {
+        "" => "another server uses it".to_owned(),
+        owner => format!("another server uses it ({})", owner.escape_debug()),
+    }
+}
+
 /// Creates a private folder with its parents, or makes an existing folder private.
 pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
     let mut builder = DirBuilder::new();
@@ -273,8 +358,16 @@ pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
+/// Writes a new file that was private from its first moment.
+pub(crate) fn write_private(file: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut options = File::options();
+    #[cfg(unix)]
+    options.mode(FILE_MODE);
+    options.write(true).create_new(true).open(file)?.write_all(bytes)
+}
+
 /// Makes a file private.
-pub(crate) fn make_private(file: &Path) {
+fn make_private(file: &Path) {
     set_mode(file, FILE_MODE);
 }
 

@@ -1,10 +1,15 @@
 //! Records: files with the SHA-256 of a message before it, so that any changed or missing byte shows.
 
-use std::{collections::BTreeSet, fmt, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt, iter,
+    sync::Arc,
+};
 
 use bytes::Bytes;
+use grasp_proto::has_too_many_parts;
 use object_store::{Error, path::Path};
-use prost::{Message, decode_length_delimiter, encode_length_delimiter};
+use prost::{Message, Name, decode_length_delimiter, encode_length_delimiter};
 use sha2::{Digest as _, Sha256};
 
 use super::{SavedFiles, StoreError, log_failure};
@@ -12,14 +17,22 @@ use super::{SavedFiles, StoreError, log_failure};
 /// Length of the hash before the message.
 const HASH_BYTES: usize = 32;
 
-/// Largest file of names, in bytes.
-const MAX_NAMES: u64 = 1 << 30;
+/// Most names in a file of names: as many as a server can be configured to keep.
+const MAX_NAMES: usize = 1_000_000;
+
+/// Longest name, in bytes.
+const MAX_NAME: usize = 63;
+
+/// Largest file of names, in bytes: each with the number of its field and its length.
+const MAX_NAMES_BYTES: u64 = (MAX_NAMES * (MAX_NAME + 2) + HASH_BYTES) as u64;
 
 /// Why a record cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unreadable {
     #[error("its file is missing")]
     Missing,
+    #[error("its file has more bytes than the server's limits allow")]
+    Size,
     #[error("its SHA-256 does not match its content")]
     Hash,
     #[error("its content is not a record of this version")]
@@ -57,6 +70,22 @@ pub(crate) struct Records {
 struct Names {
     #[prost(string, repeated, tag = "1")]
     names: Vec<String>,
+}
+
+/// The names of a message. `None` if it is not one, or has too many or too long ones: read one by one, a forged message takes no more
+/// memory than a right one.
+fn names_of(mut message: &[u8]) -> Option<BTreeSet<String>> {
+    let mut names = BTreeSet::new();
+    while !message.is_empty() {
+        let field = take_field(&mut message)?;
+        let is_name =
+            (field.number, field.wire_type) == (1, 2) && (1..=MAX_NAME).contains(&field.content.len());
+        if !is_name || names.len() == MAX_NAMES {
+            return None;
+        }
+        names.insert(str::from_utf8(field.content).ok()?.to_owned());
+    }
+    Some(names)
 }
 
 #[derive(Debug)]
@@ -152,15 +181,15 @@ impl Records {
 
     /// The names that were last written; empty if they never were, or cannot be read.
     async fn names(&self) -> Result<BTreeSet<String>, Error> {
-        let parse = |message: &[u8]| Names::decode(message).map_err(|_| Unreadable::Message);
+        let parse = |message: &[u8]| names_of(message).ok_or(Unreadable::Message);
         let file = self.names_path();
-        let read = self.read_file(&file, MAX_NAMES, parse).await?;
+        let read = self.read_file(&file, MAX_NAMES_BYTES, parse).await?;
         if let Err(wrong) = read
             && wrong != Unreadable::Missing
         {
             tracing::error!(%file, %wrong, "the names of what is saved are damaged: what is missing will not be missed");
         }
-        Ok(read.unwrap_or_default().names.into_iter().collect())
+        Ok(read.unwrap_or_default())
     }
 
     async fn write_names(&self, names: Vec<String>) -> Result<(), Error> {
@@ -174,8 +203,7 @@ impl Records {
         parse: impl FnOnce(&[u8]) -> Result<T, Unreadable>,
     ) -> Result<Result<T, Unreadable>, Error> {
         let bytes = self.files.read(path, max_bytes).await?;
-        let message = bytes.as_deref().ok_or(Unreadable::Missing).and_then(unsealed);
-        Ok(message.and_then(parse))
+        Ok(bytes.and_then(|bytes| parse(unsealed(&bytes)?)))
     }
 
     fn path(&self, id: &str) -> Path {
@@ -206,30 +234,68 @@ pub(crate) const fn message(old: usize, now: &'static [usize], fields: &'static 
     FieldMove { old, now, fields }
 }
 
+/// A field of a message as it was written.
+struct WrittenField<'m> {
+    number: usize,
+    wire_type: usize,
+    /// The content of a message, text or bytes; of a number, nothing or its bytes.
+    content: &'m [u8],
+    /// All but the number and the type.
+    value: &'m [u8],
+}
+
+/// Takes the first field off a message. `None` if it is not a message.
+fn take_field<'m>(message: &mut &'m [u8]) -> Option<WrittenField<'m>> {
+    let key = decode_length_delimiter(&mut *message).ok()?;
+    let mut rest = *message;
+    let length = match key & 7 {
+        0 => decode_length_delimiter(&mut rest).map(|_| 0).ok()?,
+        1 => 8,
+        5 => 4,
+        _ => decode_length_delimiter(&mut rest).ok()?,
+    };
+    let (content, rest) = rest.split_at_checked(length)?;
+    let value = &message[..message.len() - rest.len()];
+    *message = rest;
+    Some(WrittenField {
+        number: key >> 3,
+        wire_type: key & 7,
+        content,
+        value,
+    })
+}
+
+/// True if a record has one message of this type at most, in the field `number`, which is small enough in memory to be decoded.
+pub(crate) fn is_decodable<M: Name>(record: &[u8], number: usize) -> bool {
+    let mut contents = contents(record, number);
+    let is_small = contents
+        .next()
+        .is_none_or(|content| !has_too_many_parts::<M>(content));
+    is_small && contents.next().is_none()
+}
+
+/// The contents of a message's fields of this number, up to the first that is not one.
+fn contents(mut message: &[u8], number: usize) -> impl Iterator<Item = &[u8]> {
+    let fields = iter::from_fn(move || take_field(&mut message));
+    fields
+        .filter(move |field| field.number == number)
+        .map(|field| field.content)
+}
+
 /// A message with its fields in their new places. `None` if it is not a message.
 pub(crate) fn move_fields(mut old: &[u8], moves: &[FieldMove]) -> Option<Vec<u8>> {
-    let (mut now, mut numbers) = (Vec::new(), Vec::new());
+    let (mut now, mut counts) = (Vec::new(), BTreeMap::<usize, usize>::new());
     while !old.is_empty() {
-        let key = decode_length_delimiter(&mut old).ok()?;
-        let (number, wire_type) = (key >> 3, key & 7);
-        let mut rest = old;
-        let length = match wire_type {
-            0 => decode_length_delimiter(&mut rest).map(|_| 0).ok()?,
-            1 => 8,
-            5 => 4,
-            _ => decode_length_delimiter(&mut rest).ok()?,
-        };
-        let (mut content, rest) = rest.split_at_checked(length)?;
-        let value = &old[..old.len() - rest.len()];
-        old = rest;
-        let earlier = numbers.iter().filter(|earlier| **earlier == number).count();
-        numbers.push(number);
-        let places = moves.iter().filter(|to| to.old == number);
-        let Some(place) = places.take(earlier + 1).last() else {
+        let field = take_field(&mut old)?;
+        let count = counts.entry(field.number).or_default();
+        *count += 1;
+        let places = moves.iter().filter(|to| to.old == field.number);
+        let Some(place) = places.take(*count).last() else {
             continue;
         };
         let inner;
-        let mut value = value.to_vec();
+        let mut content = field.content;
+        let mut value = field.value.to_vec();
         if !place.fields.is_empty() {
             inner = move_fields(content, place.fields)?;
             content = &inner;
@@ -239,7 +305,7 @@ pub(crate) fn move_fields(mut old: &[u8], moves: &[FieldMove]) -> Option<Vec<u8>
             now.extend(content);
             continue;
         };
-        value.splice(0..0, varint((own << 3) | wire_type));
+        value.splice(0..0, varint((own << 3) | field.wire_type));
         for number in outer.iter().rev() {
             value = [varint((number << 3) | 2), varint(value.len()), value].concat();
         }
@@ -264,7 +330,10 @@ mod tests {
             names: vec!["mug".to_owned(), "a longer name".to_owned()],
         };
         let bytes = seal(&names);
-        assert_eq!(Names::decode(unsealed(&bytes).unwrap()), Ok(names));
+        assert_eq!(
+            names_of(unsealed(&bytes).unwrap()),
+            Some(names.names.into_iter().collect())
+        );
         for place in 0..bytes.len() {
             for flipped in [0x01, 0x80, 0xff] {
                 let mut damaged = bytes.to_vec();

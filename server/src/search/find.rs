@@ -335,7 +335,7 @@ mod tests {
                 };
                 executor
                     .run(admission, |workers, _| {
-                        workers.in_turn(|pool| pool.install(occupy));
+                        workers.in_turn(None, |pool| pool.install(occupy));
                     })
                     .await
             })

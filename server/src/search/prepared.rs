@@ -155,11 +155,13 @@ impl PreparedJob {
             settings[place].known.tried = ALL_TRIED;
         }
         let search = |place: HandPlace| (self.task(place), &settings[place]);
-        if self.hands.len() > 1 {
+        let ended = if self.hands.len() > 1 {
             search_either(site, [search(0), search(1)], self.patience)
         } else {
             search_in_slices(site, search(0), self.patience)
-        }
+        };
+        workers.end_turn();
+        ended
     }
 
     pub(super) fn frame(&self) -> ClientFrame {

@@ -236,6 +236,10 @@ impl<'a> Slices<'a> {
         let end = outcome.end;
         let found = self.add(outcome);
         self.per_worker = next_size(self.per_worker, site.clock.now().saturating_sub(start));
+        if let Found::Replaceable { by: Some(_), .. } = found {
+            // Those without a grasp go first: the time for a better one passes meanwhile.
+            site.workers.end_turn();
+        }
         let is_stopped = site.stop.is_over();
         (if is_stopped { SearchEnd::Stopped } else { end }, found)
     }
@@ -245,7 +249,9 @@ impl<'a> Slices<'a> {
         let site = self.site;
         self.next.run.max_attempts = self.left.min(attempts);
         let find = |pool: &ThreadPool| find_grasp(pool, &self.scene, &self.next, site.clock, site.stop);
-        let outcome = site.workers.in_turn(find);
+        let left = self.next.run.deadline;
+        let left = left.map(|deadline| deadline.saturating_sub(site.clock.now()));
+        let outcome = site.workers.in_turn(left, find);
         self.next.known.atlas = None;
         self.next.known.learned = None;
         self.next.known.preferred = Arc::default();

@@ -47,12 +47,11 @@ pub(crate) fn judge(
     let HandSearch { hand, settings, .. } = &prepared.hands[0];
     let task = prepared.task(0);
     let pose = grasp.at_object(task.rig, frame.client_from_object);
-    let mut judgement = workers.in_turn(|_| verdicts::judge(task, &settings.query, &pose, stop))?;
+    let mut judgement = verdicts::judge(task, &settings.query, &pose, stop)?;
     let nearest = if find_nearest && !judgement.is_valid() {
         let is_over = || prepared.now() >= prepared.budget;
         // A search is due if nothing known is valid.
-        workers
-            .in_turn(|_| nearest_grasp(task, settings, &pose, Stop::when(&is_over)))
+        nearest_grasp(task, settings, &pose, Stop::when(&is_over))
             .or_else(|| prepared.search(workers, stop, &Progress::default()).outcome.grasp)
     } else {
         None
@@ -183,11 +182,7 @@ fn rating(
     let is_over = || stop.is_over() || prepared.now() >= prepared.budget;
     let hands = prepared.hands.iter().enumerate();
     let evaluation = hands
-        .map(|(place, hand)| {
-            let evaluate =
-                || evaluation::evaluate(prepared.task(place), &hand.settings, Stop::when(&is_over));
-            workers.in_turn(|_| evaluate())
-        })
+        .map(|(place, hand)| evaluation::evaluate(prepared.task(place), &hand.settings, Stop::when(&is_over)))
         .fold(Evaluation::default(), |sum, hand| sum.with(&hand));
     let valid = evaluation.valid();
     let mut found = None;

@@ -52,10 +52,15 @@ impl Handler {
         call: &CallContext,
         work: impl FnOnce(FindJob, Workers<'_>, Stop<'_>) -> Result<Answered<T>, ServiceError> + Send + 'static,
     ) -> Result<T, ServiceError> {
+        // Each takes a core besides its turns at the workers.
+        let turn = before(call.answer_due(), self.examining.acquire(&call.client)).await?;
         let (admission, job) = self.ready(holdout, call).await?;
         let overdue = job.overdue();
         // Boxed: jobs of some kilobytes would make the futures of all calls large.
-        let work = Box::new(move |workers: Workers<'_>, stop: Stop<'_>| work(job, workers, stop));
+        let work = Box::new(move |workers: Workers<'_>, stop: Stop<'_>| {
+            let _turn = turn;
+            work(job, workers, stop)
+        });
         let answered = before(overdue, self.executor.run(admission, work)).await???;
         call.search_ended(answered.ended, answered.summary);
         Ok(answered.response)
@@ -66,11 +71,12 @@ impl Handler {
         query: FindQuery,
         call: &CallContext,
     ) -> Result<(Admission, FindJob), ServiceError> {
-        let admission = match call.take_admission() {
-            Some(admission) => admission,
-            None => self
-                .executor
-                .admit(&call.client, call.latest_end(self.config.budgets.maximum))?,
+        let admission = if let Some(admission) = call.take_admission() {
+            admission
+        } else {
+            let own = call.caller.take_search()?;
+            let due = call.latest_end(self.config.budgets.maximum);
+            self.executor.admit(&call.client, due)?.within(own)
         };
         call.search_begins(&admission);
         call.log_object(&query.object_id);
@@ -206,7 +212,7 @@ impl GraspService for Handler {
         let StreamQuery { find, sent } = stream_query(request, self.known_rigs(), self.exists())?;
         let ready = self.ready(find, &call).await?;
         let handler = self.clone();
-        let messages = messages(self.shutdown.clone(), |sender| async move {
+        let messages = messages(self, |sender| async move {
             handler.send_found(sent, ready, &call, sender).await
         });
         Ok(Response::new(messages))
@@ -236,7 +242,8 @@ impl GraspService for Handler {
     }
 
     async fn delete_track(&self, request: Request<v1::DeleteTrackRequest>) -> Result<Response<()>, Status> {
-        self.tracks.delete(&request.into_inner().name).await?;
+        let caller = CallContext::of(&request).caller;
+        self.tracks.delete(&request.into_inner().name, &caller).await?;
         Ok(Response::new(()))
     }
 

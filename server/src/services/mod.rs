@@ -75,6 +75,8 @@ pub(crate) struct Shared {
     pub deriving: Arc<Semaphore>,
     /// Permits of each client to build or prepare something: the rest of its work waits without delaying that of others.
     pub heavy: Arc<ClientPermits>,
+    /// Permits of each client to judge grasps or rate holdouts.
+    pub examining: ClientPermits,
     /// One permit: new objects are prepared ahead of calls one at a time.
     pub ahead: Semaphore,
     pub created: AtomicU64,

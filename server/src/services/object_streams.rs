@@ -21,7 +21,7 @@ use crate::{
         Listed,
         glb::glb_pieces,
         id_of, name_of,
-        store::{Event, Report},
+        store::{Event, Origin, Report},
     },
     validate::{UploadQuery, object_id_of, quoted, upload_query, watch_query},
     wire::hex,
@@ -103,7 +103,11 @@ impl Handler {
         call.log_object(id);
         // A repeated request is recognised by its mesh, too.
         if request.request_id.is_empty() {
-            self.objects.repeated(id, None)?;
+            let origin = Origin {
+                caller: call.caller.clone(),
+                ..Origin::default()
+            };
+            self.objects.repeated(id, &origin)?;
         }
         let room = self.upload_bytes.take_many(&call.client, bytes)?;
         let mut mesh: Vec<u8> = Vec::new();
@@ -180,7 +184,7 @@ impl Handler {
         let place = self.watchers.take(&call.client)?;
         let watcher = self.objects.watch(query);
         let handler = self.clone();
-        Ok(messages(self.shutdown.clone(), |sender| async move {
+        Ok(messages(self, |sender| async move {
             let _place = place;
             loop {
                 match handler.objects.next_report(&watcher)? {

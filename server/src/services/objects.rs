@@ -15,11 +15,13 @@ use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
+    faults::FaultPoint,
     limits::MAX_RESPONSE,
     objects::{
         Listed,
         build::{build_object, changed},
         given::check_grips,
+        name_of,
         store::Origin,
     },
     validate::{
@@ -48,17 +50,19 @@ impl Handler {
         call: &CallContext,
         stop: Stop<'_>,
     ) -> Result<Listed, ServiceError> {
+        self.executor.faults.at(FaultPoint::Build);
         let violations = Violations::default();
         let mut fields = object_fields(request, limits.bytes, &violations);
         let mut origin = Origin {
             labels: std::mem::take(&mut fields.labels),
             request: fields.request,
             mesh: Bytes::new(),
+            caller: call.caller.clone(),
         };
         if violations.is_empty() {
             call.log_object(&fields.id);
             // Checked again on insertion; checked here to avoid building the object in vain.
-            if let Some(object) = self.objects.repeated(&fields.id, origin.request.as_ref())? {
+            if let Some(object) = self.objects.repeated(&fields.id, &origin)? {
                 return Ok(object);
             }
         }
@@ -100,6 +104,7 @@ impl Handler {
         let objects = &self.objects;
         objects.found(&query.id).await?;
         let base = objects.changeable(&query.id, query.etag.as_deref())?;
+        call.caller.check_owns(&name_of(&query.id), &base.record.owner)?;
         query.check_immutable(&base.to_wire())?;
         // Changing labels does not need the object.
         let object = if query.change.is_empty() {
@@ -291,7 +296,11 @@ impl ObjectService for Handler {
         let id = checked_id(&request.name, object_id_of)?;
         call.log_object(&id);
         let etag = given_etag(request.etag);
-        let remove = move |shared: &Shared| shared.objects.remove(&id, etag.as_deref());
+        let remove = move |shared: &Shared| {
+            // No other deletion runs meanwhile.
+            shared.objects.check_owned(&id, &call.caller)?;
+            shared.objects.remove(&id, etag.as_deref())
+        };
         match self.delete_in_turn(remove).await {
             Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
             result => result?,

@@ -1,6 +1,6 @@
 //! `HandRigService`, and rigs made from its checked requests.
 
-use std::{sync::Arc, time::Duration};
+use std::{fmt, sync::Arc, time::Duration};
 
 use glam::Vec3;
 use grasp_assets::hands::{self, Hand};
@@ -28,8 +28,9 @@ use tonic::{Request, Response, Status};
 
 use super::{Handler, Shared, checked_id};
 use crate::{
+    access::Owner,
     answer::{wire_joint, wire_rejection},
-    call::UploadPermit,
+    call::{CallContext, UploadPermit},
     convention::Convention,
     error::ServiceError,
     executor::run_blocking,
@@ -74,8 +75,14 @@ impl HandRigService for Handler {
         let (rigs, more) = self.rigs.page(query.after.as_deref(), query.size);
         let last = rigs.last().filter(|_| more);
         Ok(Response::new(v1::ListRigsResponse {
-            next_page_token: last.map(|last| rig_page_token(&last.id)).unwrap_or_default(),
-            rigs: rigs.iter().map(|rig| rig_message(rig)).collect(),
+            next_page_token: last.map(|(id, _)| rig_page_token(id)).unwrap_or_default(),
+            rigs: rigs
+                .iter()
+                .map(|(id, rig)| {
+                    rig.as_ref()
+                        .map_or_else(|| damaged_message(id), |rig| rig_message(rig))
+                })
+                .collect(),
         }))
     }
 
@@ -88,6 +95,7 @@ impl HandRigService for Handler {
         &self,
         mut request: Request<v1::CreateRigRequest>,
     ) -> Result<Response<v1::HandRig>, Status> {
+        let caller = CallContext::of(&request).caller;
         let permit = UploadPermit::of(&mut request);
         permit.take_turn().await?;
         let (shared, request) = (Arc::clone(&self.0), request.into_inner());
@@ -95,12 +103,14 @@ impl HandRigService for Handler {
             let _permit = permit;
             let limits = shared.config.mesh_limits(shared.config.maximum_object_bytes);
             let violations = Violations::default();
-            let record = shared.rigs.record(&request);
+            let owner = caller.owner();
+            let record = shared.rigs.record(&request, &owner);
             let fields = rig_fields(request, limits.bytes, &violations);
             if violations.is_empty() {
                 shared.rigs.check_room(&fields.id)?;
+                shared.rigs.check_share(&owner)?;
             }
-            let mut rig = build_rig(fields, limits, violations)?;
+            let mut rig = build_rig(fields, owner, limits, violations)?;
             prepare_rig(&rig);
             try_rig(&mut rig)?;
             shared.rigs.insert(rig, record)
@@ -111,7 +121,12 @@ impl HandRigService for Handler {
 
     async fn delete_rig(&self, request: Request<v1::DeleteRigRequest>) -> Result<Response<()>, Status> {
         let id = checked_id(&request.get_ref().name, rig_id_of)?;
-        let delete = move |shared: &Shared| shared.rigs.delete(&id);
+        let caller = CallContext::of(&request).caller;
+        let delete = move |shared: &Shared| {
+            // No other deletion runs meanwhile.
+            shared.rigs.check_owned(&id, &caller)?;
+            shared.rigs.delete(&id)
+        };
         Ok(Response::new(self.delete_in_turn(delete).await?))
     }
 }
@@ -120,6 +135,7 @@ fn rig_message(rig: &StoredRig) -> v1::HandRig {
     v1::HandRig {
         name: rig.name(),
         built_in: rig.built_in,
+        owner: rig.owner.to_string(),
         hands: rig
             .hands
             .iter()
@@ -127,6 +143,16 @@ fn rig_message(rig: &StoredRig) -> v1::HandRig {
             .map(|(hand, mirrored)| wire_hand(hand, mirrored))
             .collect(),
         warnings: rig.warnings.clone(),
+    }
+}
+
+/// A rig of which only the name is known.
+fn damaged_message(id: &str) -> v1::HandRig {
+    let warning = "its record is damaged or missing; put the file back, or delete the rig";
+    v1::HandRig {
+        name: name_of(id),
+        warnings: vec![warning.to_owned()],
+        ..Default::default()
     }
 }
 
@@ -176,6 +202,7 @@ fn wire_limits(digit: Digit, limits: &DigitLimits) -> v1::DigitLimits {
 
 fn build_rig(
     fields: RigFields,
+    owner: Owner,
     limits: MeshLimits,
     violations: Violations,
 ) -> Result<StoredRig, ServiceError> {
@@ -229,6 +256,7 @@ fn build_rig(
     violations.finish(StoredRig {
         id: fields.id,
         built_in: false,
+        owner,
         hands: [made.left, made.right].map(rig_hand),
         mirrored,
         warnings,
@@ -369,14 +397,15 @@ async fn saved_rig(
     limits: MeshLimits,
 ) -> Result<Result<StoredRig, Unreadable>, StoreError> {
     let read = saved_request(saved, id).await;
-    let request = match read.map_err(|error| saved.error(&error))? {
-        Ok(request) => request,
+    let (request, owner) = match read.map_err(|error| saved.error(&error))? {
+        Ok(read) => read,
+        Err(Unreadable::Size) => return Err(unloadable(saved, id, &Unreadable::Size)),
         Err(wrong) => return Ok(Err(wrong)),
     };
     let made = run_blocking(move || {
         let violations = Violations::default();
         let fields = rig_fields(request, limits.bytes, &violations);
-        build_rig(fields, limits, violations)
+        build_rig(fields, owner, limits, violations)
     });
     made.await
         .flatten()
@@ -385,7 +414,7 @@ async fn saved_rig(
 }
 
 /// The error of a rig that is beyond the limits of this server.
-fn unloadable(saved: &Records, id: &str, error: &ServiceError) -> StoreError {
+fn unloadable(saved: &Records, id: &str, error: &dyn fmt::Display) -> StoreError {
     let name = name_of(id);
     saved.error(&format_args!(
         "{name} was saved, but this server cannot load it: {error}; raise its limits"

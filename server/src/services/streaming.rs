@@ -10,10 +10,10 @@ use std::{
 use futures_util::stream::{self, BoxStream};
 use tokio::sync::mpsc::{self, error::SendTimeoutError};
 use tokio_stream::wrappers::ReceiverStream;
-use tokio_util::sync::CancellationToken;
 use tonic::Status;
 
-use crate::{error::ServiceError, limits::locked};
+use super::Shared;
+use crate::{error::ServiceError, executor::contained, faults::FaultPoint, limits::locked};
 
 /// Messages that wait for the transport. More keep a quick client busier; each takes memory per stream.
 const QUEUED: usize = 2;
@@ -38,18 +38,20 @@ impl<T> MessageSender<T> {
     }
 }
 
-/// Sends the messages of `produce` in a task that ends when the client is gone. An error becomes the status, and so does the end of
-/// the server.
-pub(crate) fn messages<T, F>(
-    shutdown: CancellationToken,
-    produce: impl FnOnce(MessageSender<T>) -> F,
-) -> Messages<T>
+/// Sends the messages of `produce` in a task that ends when the client is gone. An error becomes the status, and so do a panic and the
+/// end of the server.
+pub(crate) fn messages<T, F>(shared: &Shared, produce: impl FnOnce(MessageSender<T>) -> F) -> Messages<T>
 where
     T: Send + 'static,
     F: Future<Output = Result<(), ServiceError>> + Send + 'static,
 {
     let (sender, receiver) = mpsc::channel(QUEUED);
     let producing = produce(MessageSender(sender.clone()));
+    let (shutdown, faults) = (shared.shutdown.clone(), shared.executor.faults.clone());
+    let producing = contained(async move {
+        faults.at(FaultPoint::Stream);
+        producing.await
+    });
     tokio::spawn(async move {
         let produced = tokio::select! {
             () = sender.closed() => return,

@@ -17,6 +17,8 @@ use crate::{
     call::CallContext,
     convention::Convention,
     error::{Limit, ServiceError},
+    executor::contained,
+    faults::FaultPoint,
     limits::{MAX_FIND_REQUEST, Place},
     track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, not_found},
     validate::{Frame, Latest, TrackPolicy, TrackQuery, sentences, track_query},
@@ -64,8 +66,7 @@ impl Handler {
         let (inbox, call, handler) = (Arc::clone(&track.inbox), call.clone(), self.clone());
         let mut reader = JoinSet::new();
         reader.spawn(async move {
-            let end = read(frames, &inbox, &call, &handler).await;
-            inbox.end(end);
+            inbox.end(contained(read(frames, &inbox, &call, &handler)).await);
         });
         Ok(answers(track, reader))
     }
@@ -77,7 +78,9 @@ impl Handler {
     ) -> Result<v1::Track, ServiceError> {
         let started = self.start(track.clone(), true, call).await?;
         let inbox = Arc::clone(&started.inbox);
-        let name = self.tracks.open(inbox, started.answer_pushed());
+        let name = self
+            .tracks
+            .open(call.caller.owner(), inbox, started.answer_pushed());
         Ok(v1::Track { name, ..track })
     }
 
@@ -90,7 +93,7 @@ impl Handler {
         let (reply, answer) = oneshot::channel();
         // Does not hold the track while it waits.
         put(
-            &*self.tracks.inbox(&name)?,
+            &*self.tracks.inbox(&name, &call.caller)?,
             frame,
             call.clone(),
             Some(reply),
@@ -150,6 +153,7 @@ async fn read(
     call: &CallContext,
     shared: &Shared,
 ) -> Result<(), ServiceError> {
+    shared.executor.faults.at(FaultPoint::Frames);
     while let Some(request) = frames.message().await.map_err(|status| broken(&status))? {
         match request.message {
             Some(Message::Frame(frame)) => put(inbox, frame, call.of_part(Instant::now()), None, shared)?,
@@ -217,13 +221,17 @@ impl Track {
         }
     }
 
-    /// Answers pushed frames, until none comes for too long or the server shuts down.
+    /// Answers pushed frames, until none comes for too long, an answer panics, or the server shuts down.
     async fn answer_pushed(mut self) {
         while let Ok(Some(PendingFrame { latest, call, reply })) = self.latest().await {
-            let answer = self.answer(latest, &call).await;
+            let answer = Box::pin(contained(self.answer(latest, &call))).await;
+            let is_broken = matches!(answer, Err(ServiceError::Panicked));
             if reply.is_some_and(|reply| reply.send(answer).is_err()) {
                 // Nobody received it.
                 self.holding.is_sent = false;
+            }
+            if is_broken {
+                return;
             }
         }
     }
@@ -324,6 +332,7 @@ impl Track {
         call: &CallContext,
     ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &*self.handler;
+        shared.executor.faults.at(FaultPoint::Frame);
         self.holding.hold(&mut frame, at, &self.policy, &shared.rigs)?;
         let object = shared.object(&self.object_id, call).await?.object;
         self.held = object.hold();

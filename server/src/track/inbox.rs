@@ -15,6 +15,7 @@ use tokio::{
 use uuid::Uuid;
 
 use crate::{
+    access::{Caller, Owner},
     call::CallContext,
     error::{Limit, ServiceError},
     limits::{Places, locked},
@@ -163,6 +164,7 @@ pub(crate) struct OpenTracks {
 
 #[derive(Debug)]
 struct OpenTrack {
+    owner: Owner,
     inbox: Arc<Inbox>,
     /// The only task, which answers its frames.
     task: JoinSet<()>,
@@ -188,9 +190,10 @@ impl OpenTracks {
         }
     }
 
-    /// Opens a track under a name that cannot be guessed, which is returned. It ends with `answers`, or when it is deleted.
+    /// Opens a track of an owner under a name that cannot be guessed, which is returned. It ends with `answers`, or when it is deleted.
     pub(crate) fn open(
         self: &Arc<Self>,
+        owner: Owner,
         inbox: Arc<Inbox>,
         answers: impl Future<Output = ()> + Send + 'static,
     ) -> String {
@@ -205,20 +208,28 @@ impl OpenTracks {
             let _named = named;
             answers.await;
         });
-        tracks.insert(id, OpenTrack { inbox, task });
+        tracks.insert(id, OpenTrack { owner, inbox, task });
         format!("{COLLECTION}{}", id.simple())
     }
 
-    pub(crate) fn inbox(&self, name: &str) -> Result<Arc<Inbox>, ServiceError> {
+    /// The inbox of the caller's track.
+    pub(crate) fn inbox(&self, name: &str, caller: &Caller) -> Result<Arc<Inbox>, ServiceError> {
         let id = id_of("track", name)?;
         let tracks = locked(&self.by_name);
         let track = tracks.get(&id).ok_or_else(|| not_found(name))?;
+        caller.check_owns(name, &track.owner)?;
         Ok(Arc::clone(&track.inbox))
     }
 
-    pub(crate) async fn delete(&self, name: &str) -> Result<(), ServiceError> {
+    /// Ends the caller's track.
+    pub(crate) async fn delete(&self, name: &str, caller: &Caller) -> Result<(), ServiceError> {
         let id = id_of("name", name)?;
-        let mut track = locked(&self.by_name).remove(&id).ok_or_else(|| not_found(name))?;
+        let mut track = {
+            let mut tracks = locked(&self.by_name);
+            let track = tracks.get(&id).ok_or_else(|| not_found(name))?;
+            caller.check_owns(name, &track.owner)?;
+            tracks.remove(&id).ok_or_else(|| not_found(name))?
+        };
         // Waits until its task has released everything.
         track.task.shutdown().await;
         Ok(())

@@ -243,6 +243,7 @@ fn written(object: &v1::GraspObject) -> v1::GraspObject {
         origin_in_file: Vec::new(),
         create_time: None,
         update_time: None,
+        owner: String::new(),
         ..object.clone()
     }
 }

@@ -26,8 +26,9 @@ pub(crate) use origins::{NEEDED_ORIGINS, parse_origins};
 /// How long a browser may cache the rules; the longest that browsers accept.
 const REMEMBERED: Duration = Duration::from_hours(2);
 
-/// Headers of requests that pages may set: those of the clients of gRPC-Web and Connect.
-const REQUEST_HEADERS: [HeaderName; 11] = [
+/// Headers of requests that pages may set: tokens, and those of the clients of gRPC-Web and Connect.
+const REQUEST_HEADERS: [HeaderName; 12] = [
+    header::AUTHORIZATION,
     HeaderName::from_static("connect-accept-encoding"),
     HeaderName::from_static("connect-content-encoding"),
     HeaderName::from_static("connect-protocol-version"),

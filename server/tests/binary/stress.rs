@@ -1,8 +1,7 @@
-//! A server that is killed while it saves objects, and one whose clients request meshes that they do not read.
+//! A server whose clients request meshes that they do not read.
 
 use std::{
     fs,
-    path::PathBuf,
     time::{Duration, Instant},
 };
 
@@ -12,47 +11,14 @@ use tonic::transport::{Channel, Endpoint};
 
 use crate::Running;
 
-type Client = ObjectServiceClient<Channel>;
+pub(crate) type Client = ObjectServiceClient<Channel>;
 
-/// How long a client may take to notice that its server is gone.
-const HANGS_AFTER: Duration = Duration::from_secs(30);
-
-/// A folder that is removed at the end.
-struct Folder(PathBuf);
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-fn start(folder: &Folder) -> Running {
-    let folder = folder.0.to_str().expect("the path is text");
-    Running::start(&[
-        ("GRASP_LISTEN", "127.0.0.1:0"),
-        ("GRASP_STORE", folder),
-        ("GRASP_BUILDER_THREADS", "0"),
-    ])
-}
-
-async fn client(server: &Running) -> Client {
+pub(crate) async fn client(server: &Running) -> Client {
     let connecting = ObjectServiceClient::connect(format!("http://{}", server.address));
     connecting.await.expect("it accepts connections")
 }
 
-/// Creates objects one after the other until the server is gone; returns those that it confirmed.
-async fn create_until_gone(mut client: Client, round: u64, task: usize) -> Vec<v1::GraspObject> {
-    let mut confirmed = Vec::new();
-    loop {
-        let id = format!("r{round}-{task}-{}", confirmed.len());
-        match client.create_object(hills(&id, 2)).await {
-            Ok(answer) => confirmed.push(answer.into_inner()),
-            Err(_) => return confirmed,
-        }
-    }
-}
-
-async fn mesh(client: &mut Client, name: String) -> Vec<u8> {
+pub(crate) async fn mesh(client: &mut Client, name: String) -> Vec<u8> {
     let answer = client.get_mesh(v1::GetMeshRequest { name }).await;
     let mut parts = answer.expect("it is served").into_inner();
     let mut bytes = Vec::new();
@@ -63,67 +29,10 @@ async fn mesh(client: &mut Client, name: String) -> Vec<u8> {
 }
 
 /// The vertices and triangles in a whole GLB.
-fn content(glb: &[u8]) -> &[u8] {
+pub(crate) fn content(glb: &[u8]) -> &[u8] {
     let number = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().expect("they are four bytes"));
     assert_eq!(glb.len(), number(8) as usize);
     &glb[20 + number(12) as usize..]
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn killing_the_server_leaves_every_object_whole_or_absent() {
-    let folder = Folder(std::env::temp_dir().join(format!("grasp-killed-{}", std::process::id())));
-    let mut confirmed: Vec<v1::GraspObject> = Vec::new();
-    for round in 0..3 {
-        let server = start(&folder);
-        let mut tasks = Vec::new();
-        for task in 0..3 {
-            let creating = create_until_gone(client(&server).await, round, task);
-            tasks.push(tokio::spawn(creating));
-        }
-        let folder = folder.0.join("objects");
-        let prefix = format!("r{round}-");
-        let begun = || {
-            let files = fs::read_dir(&folder).expect("it is there");
-            let names = files.filter_map(|file| file.ok()?.file_name().into_string().ok());
-            names.filter(|name| name.starts_with(&prefix)).count()
-        };
-        let start = Instant::now();
-        while begun() < 3 && start.elapsed() < HANGS_AFTER {
-            tokio::time::sleep(Duration::from_millis(5)).await;
-        }
-        tokio::time::sleep(Duration::from_millis(137 * round)).await;
-        // SIGKILL: the process has no time for anything.
-        drop(server);
-        for task in tasks {
-            let ended = tokio::time::timeout(HANGS_AFTER, task).await;
-            confirmed.extend(ended.expect("the client noticed").expect("it did not panic"));
-        }
-    }
-    assert!(confirmed.len() > 3, "it was killed before it did anything");
-    let server = start(&folder);
-    let mut client = client(&server).await;
-    let all = v1::ListObjectsRequest {
-        page_size: 1000,
-        ..Default::default()
-    };
-    let listed = client.list_objects(all).await.expect("it lists them");
-    let objects = listed.into_inner().objects.into_iter();
-    let found: Vec<_> = objects.filter(|object| !object.built_in).collect();
-    for object in &confirmed {
-        assert!(found.contains(object), "{} is lost or changed", object.name);
-    }
-    // Files that differ by a comment have the same vertices and triangles.
-    let expected = mesh(&mut client, confirmed[0].name.clone()).await;
-    for object in &found {
-        let glb = mesh(&mut client, object.name.clone()).await;
-        assert!(
-            content(&glb) == content(&expected),
-            "{} has another mesh",
-            object.name
-        );
-        assert_eq!(object.content_hash, confirmed[0].content_hash);
-    }
-    server.terminate();
 }
 
 const CONNECTIONS: usize = 20;
@@ -147,7 +56,7 @@ const SMALL: [(&str, &str); 10] = [
 ];
 
 /// A sheet of hills with so many cells along each side, of two triangles each, in a file of its own.
-fn hills(id: &str, cells: usize) -> v1::CreateObjectRequest {
+pub(crate) fn hills(id: &str, cells: usize) -> v1::CreateObjectRequest {
     let mut lines = vec![format!("# {id}")];
     for (row, column) in (0..=cells).flat_map(|row| (0..=cells).map(move |column| (row, column))) {
         let [x, y] = [row, column].map(|place| place as f32 / cells as f32);

@@ -1,9 +1,12 @@
-//! Objects and rigs saved in a bucket outlast the server.
+//! Objects and rigs saved in a bucket outlast the server, which has the bucket to itself.
 //!
 //! tests/s3/run starts an S3 server and sets the variables: `GRASP_TEST_STORE` is an empty `s3://BUCKET/PREFIX`, and `AWS_*` say where
 //! it is.
 
-use std::net::{Ipv6Addr, SocketAddr};
+use std::{
+    net::{Ipv6Addr, SocketAddr},
+    time::{Duration, Instant},
+};
 
 use grasp_proto::v1::{
     self, grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
@@ -16,6 +19,9 @@ use tonic::{
     Code,
     transport::{Channel, Endpoint},
 };
+
+/// How long a bucket is kept for a server that is gone.
+const TERM: Duration = Duration::from_secs(15);
 
 const BOX_OBJ: &str = "v -.02 -.015 -.01\nv .02 -.015 -.01\nv .02 .015 -.01\nv -.02 .015 -.01\n\
                        v -.02 -.015 .01\nv .02 -.015 .01\nv .02 .015 .01\nv -.02 .015 .01\n\
@@ -126,13 +132,34 @@ async fn objects_and_rigs_in_a_bucket_outlast_the_server() {
     };
     client.delete_object(delete).await.unwrap();
     create_rig(&channel).await;
+    // Another server is kept away.
+    let listener = TcpListener::bind((Ipv6Addr::LOCALHOST, 0)).await.unwrap();
+    let second = Server::new(config())
+        .unwrap()
+        .serve([listener.into()], std::future::pending());
+    let Err(ServeError::Store(error)) = second.await else {
+        panic!("two servers would overwrite each other's objects");
+    };
+    let owner = format!("another server uses it (process {} on host ", std::process::id());
+    assert!(error.to_string().contains(&owner), "{error}");
     let before = (objects(&channel).await, rigs(&channel).await);
     assert_eq!((before.0.len(), before.1.len()), (1, 1));
     server.stop().await;
 
+    // It gave the bucket back. The next one is killed, and keeps it for its term.
+    let begun = Instant::now();
     let server = Running::start().await;
     let channel = server.channel().await;
     assert_eq!((objects(&channel).await, rigs(&channel).await), before);
+    let after_an_end = begun.elapsed();
+    server.serving.abort();
+    let begun = Instant::now();
+    let server = Running::start().await;
+    let channel = server.channel().await;
+    assert_eq!((objects(&channel).await, rigs(&channel).await), before);
+    let after_a_kill = begun.elapsed();
+    println!("ready {after_an_end:?} after an end, {after_a_kill:?} after a kill");
+    assert!(after_an_end < TERM && after_a_kill >= TERM);
     // The mesh, which two objects shared, is still there.
     let request = v1::FindGraspRequest::new("objects/crate");
     let answer = GraspServiceClient::new(channel.clone()).find_grasp(request).await;

@@ -19,12 +19,6 @@ use crate::{
     server::ServerProcess,
 };
 
-/// The deadline of searches.
-pub(crate) const DEADLINE: Duration = Duration::from_millis(100);
-
-/// Connections of a load. Each may have 64 unanswered calls.
-pub(crate) const CONNECTIONS: usize = 32;
-
 /// The method that searches, for calls by hand; and the window of their answers, in bytes.
 pub(crate) const FIND_GRASP: &str = "grasp.v1.GraspService/FindGrasp";
 pub(crate) const WINDOW: u32 = 1 << 20;
@@ -70,8 +64,7 @@ impl Bench {
         bar.set_message("placing givers on objects");
         let server = start(&program, &split.server, NO_ATLASES)?;
         let requests = runtime.block_on(async {
-            let channels = connect(server.address, LIGHT, 1).await?;
-            Ok::<_, Failure>(Requests::new(&channels[0]).await?)
+            Ok::<_, Failure>(Requests::new(&connect(server.address, LIGHT).await?).await?)
         })?;
         Ok(Self {
             program,
@@ -128,22 +121,33 @@ impl Bench {
     pub(crate) async fn saturation(&self) -> Result<f64, Failure> {
         let saturation = self.capacity.get_or_try_init(|| async {
             let server = self.server(NO_ATLASES)?;
-            let channels = connect(server.address, LIGHT, CONNECTIONS).await?;
             self.step("saturation");
-            let call = find_grasp(&channels, &self.requests.searching);
-            Ok::<_, Failure>(self.saturate(call, Placement::Apart).await.goodput())
+            let call = find_grasp(server.address, LIGHT, &self.requests.searching).await?;
+            Ok::<_, Failure>(self.saturate(call, Placement::Apart).await?.goodput())
         });
         saturation.await.copied()
     }
 
     /// Keeps a server just busy with calls.
-    pub(crate) async fn saturate(&self, call: Call, placement: Placement) -> Tally {
+    ///
+    /// # Errors
+    /// It serves none.
+    pub(crate) async fn saturate(&self, call: Call, placement: Placement) -> Result<Tally, Failure> {
         let at_a_time = BUSY
             * match placement {
                 Placement::Apart => self.split.server.count(),
                 Placement::Together => self.split.all.count(),
             };
-        closed_loop(call, at_a_time, self.seconds(20, 3), DEADLINE).await
+        let tally = closed_loop(call, at_a_time, self.seconds(20, 3)).await;
+        if tally.goodput() > 0.0 {
+            Ok(tally)
+        } else {
+            Err(format!(
+                "the server serves none of {at_a_time} calls at a time: {}",
+                tally.summary()
+            )
+            .into())
+        }
     }
 }
 

@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use futures_util::future::BoxFuture;
+use futures_util::future::{BoxFuture, try_join_all};
 use grasp_client::v1::{self, grasp_service_client::GraspServiceClient};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -20,10 +20,11 @@ use tokio::{
     net::{TcpSocket, TcpStream},
     runtime::Handle,
     sync::mpsc,
+    task::JoinSet,
 };
 use tonic::{
     Code, Request, Status,
-    transport::{Channel, Endpoint},
+    transport::{self, Channel, Endpoint},
 };
 
 use crate::report::quantile;
@@ -33,6 +34,18 @@ pub(crate) const LIGHT: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 
 /// The client that takes all it can get.
 pub(crate) const HEAVY: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
+
+/// From when a call is due to its deadline.
+pub(crate) const DEADLINE: Duration = Duration::from_millis(100);
+
+/// Connections of a load. Each may have 64 unanswered calls.
+const CONNECTIONS: usize = 32;
+
+/// Pause of a client of the closed loop after a refusal.
+const AFTER_REFUSAL: Duration = Duration::from_millis(5);
+
+/// Seed of the moments when calls are due.
+const SEED: u64 = 0x4c4f_4144;
 
 /// Longest wait for a connection.
 const CONNECTS_WITHIN: Duration = Duration::from_secs(5);
@@ -95,12 +108,6 @@ impl Tally {
         quantile(&calls.map(|call| call.latency_ms).collect::<Vec<_>>(), share)
     }
 
-    /// The calls of both, as if of one load.
-    pub(crate) fn merge(&mut self, other: Self) {
-        self.calls.extend(other.calls);
-        self.seconds += other.seconds;
-    }
-
     /// How calls ended, in a line.
     pub(crate) fn summary(&self) -> String {
         let per_second = |end: End| self.count(|other| other == end) as f64 / self.seconds;
@@ -115,10 +122,8 @@ impl Tally {
             quantile(&lags, 0.99),
         );
         if let Some(first) = self.calls.iter().find_map(|call| call.failure.as_ref()) {
-            text += &format!(
-                "; {} failed, the first with {first}",
-                self.count(|end| end == End::Failed)
-            );
+            let failed = self.count(|end| end == End::Failed);
+            text = format!("{text}; {failed} failed, the first with {first}");
         }
         text
     }
@@ -127,76 +132,76 @@ impl Tally {
 /// One call: its number, and the time until its deadline. True if it was served.
 pub(crate) type Call = Arc<dyn Fn(usize, Duration) -> BoxFuture<'static, Result<bool, Status>> + Send + Sync>;
 
-/// Calls that are due at random moments.
-#[derive(Clone)]
-pub(crate) struct OpenLoop {
-    /// Mean number per second.
-    pub(crate) rate: f64,
-    /// For how long calls are due.
-    pub(crate) length: Duration,
-    /// From when a call is due to its deadline.
-    pub(crate) deadline: Duration,
-    /// How often a call is sent, as long as it is refused. Later tries have the same deadline and follow at once.
-    pub(crate) tries: usize,
-    /// The moments follow from it.
-    pub(crate) seed: u64,
-}
-
-impl OpenLoop {
-    /// Makes the calls and waits for the end of the last.
-    pub(crate) async fn run(&self, call: Call) -> Tally {
-        let (ended, mut calls) = mpsc::unbounded_channel();
-        let plan = self.clone();
-        let runtime = Handle::current();
-        // A thread of its own: the timers of the runtime have a resolution of a millisecond.
-        thread::spawn(move || plan.pace(&runtime, &call, &ended));
-        let mut tally = Tally {
-            calls: Vec::new(),
-            seconds: self.length.as_secs_f64(),
-        };
-        while let Some(call) = calls.recv().await {
-            tally.calls.push(call);
-        }
-        tally
-    }
-
-    fn pace(&self, runtime: &Handle, call: &Call, ended: &mpsc::UnboundedSender<Ended>) {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(self.seed);
+/// Makes calls at random moments, `rate` per second in the mean, for some time, and waits for the end of the last. A refused one is sent
+/// again at once, up to `tries` times in all, with the same deadline.
+pub(crate) async fn open_loop(call: Call, rate: f64, length: Duration, tries: usize) -> Tally {
+    let (ended, mut calls) = mpsc::unbounded_channel();
+    let runtime = Handle::current();
+    // A thread of its own: the timers of the runtime have a resolution of a millisecond.
+    thread::spawn(move || {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
         let start = Instant::now();
         let mut due = Duration::ZERO;
         for number in 0.. {
             // Gaps of a Poisson process.
-            due += Duration::from_secs_f64(-(1.0 - random.random::<f64>()).ln() / self.rate);
+            due += Duration::from_secs_f64(-(1.0 - random.random::<f64>()).ln() / rate);
             // Without a receiver, nobody waits for the load any more.
-            if due > self.length || ended.is_closed() {
+            if due > length || ended.is_closed() {
                 break;
             }
             thread::sleep((start + due).saturating_duration_since(Instant::now()));
-            let (call, ended) = (Arc::clone(call), ended.clone());
-            let (deadline, tries) = (self.deadline, self.tries);
+            let (call, ended) = (Arc::clone(&call), ended.clone());
             runtime.spawn(async move {
-                let _ = ended.send(one_call(&call, number, due, start + due, deadline, tries).await);
+                let _ = ended.send(one_call(&call, number, start, due, tries).await);
             });
         }
+    });
+    let mut tally = Tally {
+        calls: Vec::new(),
+        seconds: length.as_secs_f64(),
+    };
+    while let Some(call) = calls.recv().await {
+        tally.calls.push(call);
+    }
+    tally
+}
+
+/// Makes calls for some time, `at_a_time` at any moment.
+pub(crate) async fn closed_loop(call: Call, at_a_time: usize, length: Duration) -> Tally {
+    let start = Instant::now();
+    let next = Arc::new(AtomicUsize::new(0));
+    let mut loops = JoinSet::new();
+    for _ in 0..at_a_time {
+        let (call, next) = (Arc::clone(&call), Arc::clone(&next));
+        loops.spawn(async move {
+            let mut calls = Vec::new();
+            while start.elapsed() < length {
+                let number = next.fetch_add(1, Ordering::Relaxed);
+                let ended = one_call(&call, number, start, start.elapsed(), 1).await;
+                if ended.end == End::Refused {
+                    tokio::time::sleep(AFTER_REFUSAL).await;
+                }
+                calls.push(ended);
+            }
+            calls
+        });
+    }
+    Tally {
+        calls: loops.join_all().await.concat(),
+        seconds: length.as_secs_f64(),
     }
 }
 
-async fn one_call(
-    call: &Call,
-    number: usize,
-    due: Duration,
-    due_at: Instant,
-    deadline: Duration,
-    tries: usize,
-) -> Ended {
-    let lag_ms = milliseconds(due_at.elapsed());
+async fn one_call(call: &Call, number: usize, start: Instant, due: Duration, tries: usize) -> Ended {
+    let since_due = || start.elapsed().saturating_sub(due);
+    let lag_ms = milliseconds(since_due());
     let (mut end, mut failure) = (End::Unsent, None);
     for _ in 0..tries {
-        let Some(left) = deadline.checked_sub(due_at.elapsed()) else {
+        let Some(left) = DEADLINE.checked_sub(since_due()) else {
             break;
         };
         end = match call(number, left).await {
-            _ if due_at.elapsed() > deadline => End::Late,
+            _ if since_due() > DEADLINE => End::Late,
             Ok(true) => End::Served,
             Ok(false) => End::Unfound,
             Err(status) => match status.code() {
@@ -212,7 +217,7 @@ async fn one_call(
             break;
         }
     }
-    let latency_ms = milliseconds(due_at.elapsed());
+    let latency_ms = milliseconds(since_due());
     Ended {
         end,
         due,
@@ -222,46 +227,24 @@ async fn one_call(
     }
 }
 
-/// Makes calls for some time, `at_a_time` at any moment, each with this deadline.
-pub(crate) async fn closed_loop(call: Call, at_a_time: usize, length: Duration, deadline: Duration) -> Tally {
-    let start = Instant::now();
-    let next = Arc::new(AtomicUsize::new(0));
-    let loops = (0..at_a_time).map(|_| {
-        let (call, next) = (Arc::clone(&call), Arc::clone(&next));
-        tokio::spawn(async move {
-            let mut calls = Vec::new();
-            while start.elapsed() < length {
-                let number = next.fetch_add(1, Ordering::Relaxed);
-                calls.push(one_call(&call, number, start.elapsed(), Instant::now(), deadline, 1).await);
-            }
-            calls
-        })
-    });
-    let loops: Vec<_> = loops.collect();
-    let mut tally = Tally {
-        calls: Vec::new(),
-        seconds: length.as_secs_f64(),
-    };
-    for calls in loops {
-        tally.calls.extend(calls.await.expect("a client does not panic"));
-    }
-    tally
+/// A connection from an address of this machine.
+pub(crate) async fn connect(server: SocketAddr, from: IpAddr) -> Result<Channel, transport::Error> {
+    let endpoint = Endpoint::from_shared(format!("http://{server}"))?;
+    endpoint
+        .connect_timeout(CONNECTS_WITHIN)
+        .local_address(Some(from))
+        .connect()
+        .await
 }
 
-/// Connections from an address of this machine.
-pub(crate) async fn connect(
+/// As many connections as a load needs.
+pub(crate) async fn connect_all(
     server: SocketAddr,
     from: IpAddr,
-    count: usize,
-) -> Result<Arc<[Channel]>, tonic::transport::Error> {
-    let endpoint = Endpoint::from_shared(format!("http://{server}"))?
-        .connect_timeout(CONNECTS_WITHIN)
-        .local_address(Some(from));
-    let mut channels = Vec::new();
-    for _ in 0..count {
-        channels.push(endpoint.connect().await?);
-    }
-    Ok(channels.into())
+) -> Result<Arc<[Channel]>, transport::Error> {
+    try_join_all((0..CONNECTIONS).map(|_| connect(server, from)))
+        .await
+        .map(Into::into)
 }
 
 /// Opens a socket from an address of this machine.
@@ -273,17 +256,21 @@ pub(crate) async fn socket(server: SocketAddr, from: IpAddr) -> io::Result<TcpSt
     Ok(stream)
 }
 
-/// Calls of `FindGrasp` with these requests in turn, over these connections in turn. Served means found.
-pub(crate) fn find_grasp(channels: &Arc<[Channel]>, requests: &Arc<[v1::FindGraspRequest]>) -> Call {
-    let (channels, requests) = (Arc::clone(channels), Arc::clone(requests));
-    Arc::new(move |number, left| {
+/// Calls of `FindGrasp` with these requests in turn. Served means found.
+pub(crate) async fn find_grasp(
+    server: SocketAddr,
+    from: IpAddr,
+    requests: &Arc<[v1::FindGraspRequest]>,
+) -> Result<Call, transport::Error> {
+    let (channels, requests) = (connect_all(server, from).await?, Arc::clone(requests));
+    Ok(Arc::new(move |number, left| {
         let mut client = GraspServiceClient::new(channels[number % channels.len()].clone());
         let request = requests[number % requests.len()].clone();
         Box::pin(async move {
             let answer = client.find_grasp(within(left, request)).await?;
             Ok(answer.get_ref().outcome() == v1::Outcome::Found)
         })
-    })
+    }))
 }
 
 /// A request with a deadline.

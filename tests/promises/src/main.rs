@@ -67,10 +67,10 @@ fn measure(flags: Flags) -> Result<bool, Failure> {
     } else {
         flags.scenarios
     };
-    let mut rows = Vec::new();
-    for scenario in scenarios {
-        rows.extend(best_rows(&bench, scenario, flags.tries)?);
-    }
+    let rows: Vec<Row> = scenarios
+        .into_iter()
+        .flat_map(|scenario| best_rows(&bench, scenario, flags.tries))
+        .collect();
     println!("{}", table(&rows));
     if let Some(path) = flags.json {
         fs::write(path, serde_json::to_vec_pretty(&rows)?)?;
@@ -79,18 +79,31 @@ fn measure(flags: Flags) -> Result<bool, Failure> {
 }
 
 /// The rows of a scenario, the best of each if some were missed.
-fn best_rows(bench: &Bench, scenario: Scenario, tries: usize) -> Result<Vec<Row>, Failure> {
-    let mut rows = bench.measure(scenario)?;
+fn best_rows(bench: &Bench, scenario: Scenario, tries: usize) -> Vec<Row> {
+    let measure = || {
+        let rows = bench.measure(scenario);
+        rows.unwrap_or_else(|error| {
+            vec![Row::failed(
+                &format!("{scenario:?}").to_lowercase(),
+                error.to_string(),
+            )]
+        })
+    };
+    let mut rows = measure();
     for _ in 1..tries {
         if rows.iter().all(Row::is_kept) {
             break;
         }
-        let later = bench.measure(scenario)?;
-        rows = rows
-            .into_iter()
-            .zip(later)
-            .map(|(row, later)| row.better(later))
-            .collect();
+        let later = measure();
+        rows = if rows.len() == later.len() {
+            rows.into_iter()
+                .zip(later)
+                .map(|(row, later)| row.better(later))
+                .collect()
+        } else {
+            // One of them failed as a whole.
+            [rows, later].into_iter().max_by_key(Vec::len).unwrap_or_default()
+        };
     }
-    Ok(rows)
+    rows
 }

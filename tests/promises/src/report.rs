@@ -87,6 +87,11 @@ impl Row {
         Self::new(promise, Target::Stated, unit, measured, how)
     }
 
+    /// A scenario that failed before there was a figure.
+    pub(crate) fn failed(scenario: &str, error: String) -> Self {
+        Self::at_least(scenario, Unit::Share, [1.0, 1.0], f64::NAN, error)
+    }
+
     fn new(promise: &str, target: Target, unit: Unit, measured: f64, how: String) -> Self {
         Self {
             promise: promise.to_owned(),

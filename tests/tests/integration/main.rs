@@ -1,5 +1,6 @@
 //! The server over real gRPC, in one binary that is linked once.
 
+mod access;
 mod atlases;
 mod attacks;
 mod connect;
@@ -16,10 +17,12 @@ mod network;
 mod objects;
 mod observed;
 mod own_hands;
+mod panics;
 mod real_input;
 mod reported;
 mod saved;
 mod saved_by_0_1;
+mod secure;
 mod shutdown;
 mod standard;
 mod streams;

@@ -1,5 +1,7 @@
 //! Objects and rigs that are saved outlast the server, however it ends, and their time in memory.
 
+mod damage;
+
 use std::{fs, time::Duration};
 
 use grasp_proto::v1;
@@ -9,8 +11,8 @@ use tonic::{Code, Status};
 
 use crate::{
     fixtures::{
-        Folder, assert_status, bounded, box_request, create, delete, floating_remote, forbidden, get, labels,
-        list, mesh, reason, reproducible, update, update_of, with_object,
+        BOX_OBJ, Folder, assert_status, bounded, box_request, create, delete, floating_remote, forbidden,
+        get, labels, list, mesh, reason, reproducible, sha256, update, update_of, with_object,
     },
     own_hands::{new_rig, right_hand_of},
 };
@@ -149,19 +151,6 @@ async fn an_object_out_of_memory_is_found_again_by_its_name() {
     }
     let silence = tokio::time::timeout(Duration::from_millis(50), changes.message()).await;
     assert!(silence.is_err(), "{silence:?}");
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_second_server_does_not_start_on_the_same_folder() {
-    let folder = Folder::absent("saved-twice");
-    let server = start(&folder, 10).await;
-    let config = config_for(&folder);
-    let second = tokio::task::spawn_blocking(|| Server::new(config)).await.unwrap();
-    let Err(ServeError::Store(error)) = second else {
-        panic!("two servers would overwrite each other's objects");
-    };
-    assert!(error.to_string().contains("another server"), "{error}");
     server.stop().await;
 }
 

@@ -191,7 +191,6 @@ async fn a_mesh_that_is_being_read_is_complete_in_spite_of_the_shutdown() {
     let server = TestServer::start().await;
     let request = v1::GetMeshRequest {
         name: "objects/scissors".to_owned(),
-        ..Default::default()
     };
     let mut mesh = server
         .objects()

@@ -42,14 +42,17 @@ fn hash(mesh: &[u8]) -> v1::UploadObjectRequest {
 }
 
 /// The parts of a right upload in pieces of this size.
-fn parts(id: &str, mesh: &[u8], size: usize) -> Vec<v1::UploadObjectRequest> {
+pub(crate) fn parts(id: &str, mesh: &[u8], size: usize) -> Vec<v1::UploadObjectRequest> {
     let mut parts = vec![begin(box_request(id), mesh.len())];
     parts.extend(mesh.chunks(size).map(piece));
     parts.push(hash(mesh));
     parts
 }
 
-async fn upload(server: &TestServer, parts: Vec<v1::UploadObjectRequest>) -> Result<v1::GraspObject, Status> {
+pub(crate) async fn upload(
+    server: &TestServer,
+    parts: Vec<v1::UploadObjectRequest>,
+) -> Result<v1::GraspObject, Status> {
     let answer = server
         .objects()
         .await

@@ -114,6 +114,9 @@ fn describe(object: &v1::GraspObject, of_right: &v1::Atlas) -> String {
     if let [x, y, z] = object.origin_in_file[..] {
         lines.push(("origin in file", format!("{x}, {y}, {z}")));
     }
+    if !object.owner.is_empty() {
+        lines.push(("owner", object.owner.clone()));
+    }
     lines.extend(warnings(&object.warnings));
     pairs(&lines)
 }

@@ -1,6 +1,6 @@
 /** Calls of the server that serves the page. */
 import { create, fromJson, type MessageInitShape, type JsonValue } from "@bufbuild/protobuf";
-import { type Client, Code, ConnectError, createClient } from "@connectrpc/connect";
+import { type Client, Code, ConnectError, createClient, type Interceptor } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 
 import {
@@ -13,7 +13,32 @@ import { HandRigService } from "#contract/hand_rig_service_pb";
 import { type GraspObject, ObjectService, ObjectView } from "#contract/object_service_pb";
 import { TrackSchema, type Track } from "#contract/track_pb";
 
-const transport = createGrpcWebTransport({ baseUrl: location.origin });
+/** Where this tab keeps its token. */
+const TOKEN = "grasp-token";
+
+/** Sends the tab's token, and asks for one when the server wants another. */
+const authorize: Interceptor = (next) => async (request) => {
+  const token = sessionStorage.getItem(TOKEN);
+  const send = (secret: string | null) => {
+    if (secret) request.header.set("authorization", `Bearer ${secret}`);
+    return next(request);
+  };
+  try {
+    return await send(token);
+  } catch (error) {
+    if (ConnectError.from(error).code !== Code.Unauthenticated) throw error;
+    // Another call may have asked meanwhile.
+    let newer = sessionStorage.getItem(TOKEN);
+    if (newer === token) {
+      newer = prompt("This server wants a token:")?.trim() ?? null;
+      if (!newer) throw error;
+      sessionStorage.setItem(TOKEN, newer);
+    }
+    return send(newer);
+  }
+};
+
+const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptors: [authorize] });
 
 export const grasps: Client<typeof GraspService> = createClient(GraspService, transport);
 export const objects: Client<typeof ObjectService> = createClient(ObjectService, transport);

@@ -68,6 +68,7 @@ impl Call {
 
 fn admitting_one() -> Calls {
     Calls {
+        door: Arc::new(Door::open(None, false).unwrap()),
         metrics: Arc::default(),
         traces: Traces::default(),
         in_flight: watch::Sender::new(()),

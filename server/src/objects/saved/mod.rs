@@ -30,15 +30,19 @@ use uuid::Uuid;
 
 use super::{Record, StoredObject, id_of, name_of};
 use crate::{
+    access::Owner,
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
-    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, seal},
+    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, is_decodable, seal},
     validate::{Labels, RequestKey},
     wire::hex,
 };
 
 /// Largest record in bytes.
 const MAX_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
+
+/// The number of the object in a record.
+const OBJECT: usize = 10;
 
 /// Records that are read at a time at the start.
 const READ_AT_A_TIME: usize = 16;
@@ -183,7 +187,7 @@ impl SavedObjects {
     }
 
     /// The mesh file of an object, to be compared with its hash, and room for it until the permit is dropped. `None` if it is
-    /// missing. [`ServiceError::ObjectUnloadable`] if it is too large.
+    /// missing or too long. [`ServiceError::ObjectUnloadable`] if it is too large.
     pub(crate) async fn mesh(
         &self,
         saved: &SavedObject,
@@ -198,10 +202,8 @@ impl SavedObjects {
         let permits = (bytes as usize).div_ceil(BYTES_PER_PERMIT) as u32;
         let acquired = Arc::clone(&self.load_bytes).acquire_many_owned(permits).await;
         let room = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        Ok((
-            self.files.read(&mesh_path(&saved.mesh_hash()), bytes).await?,
-            room,
-        ))
+        let read = self.files.read(&mesh_path(&saved.mesh_hash()), bytes).await?;
+        Ok((read.ok(), room))
     }
 }
 
@@ -277,6 +279,7 @@ impl SavedObject {
     pub(crate) fn description(self) -> v1::GraspObject {
         v1::GraspObject {
             labels: Labels::new(),
+            owner: String::new(),
             etag: String::new(),
             ..self.without_lists().object
         }
@@ -286,6 +289,7 @@ impl SavedObject {
     pub(crate) fn record(&self) -> Option<Record> {
         Some(Record {
             labels: self.object.labels.clone(),
+            owner: Owner::named(&self.object.owner),
             etag: self.object.etag.clone(),
             created: SystemTime::try_from(self.object.create_time?).ok()?,
             updated: SystemTime::try_from(self.object.update_time?).ok()?,
@@ -307,6 +311,11 @@ impl SavedObject {
         })
     }
 
+    /// Size of the mesh file in bytes.
+    pub(crate) fn mesh_bytes(&self) -> u64 {
+        self.mesh_bytes
+    }
+
     /// SHA-256 of the mesh file.
     pub(crate) fn mesh_hash(&self) -> MeshHash {
         // Only refused messages have another length.
@@ -315,6 +324,9 @@ impl SavedObject {
 
     /// The record of the object with this id.
     fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
+        if !is_decodable::<v1::GraspObject>(message, OBJECT) {
+            return Err(Unreadable::Message);
+        }
         let mut saved = Self::decode(message).map_err(|_| Unreadable::Message)?;
         if saved.object.name.is_empty() {
             let old = version_0_1::read(message).ok_or(Unreadable::Message)?;

@@ -22,6 +22,7 @@ use tokio::runtime::{EnterGuard, Runtime};
 
 use super::*;
 use crate::{
+    access::Caller,
     limits::StoreLimits,
     objects::{
         Listed,
@@ -121,6 +122,7 @@ fn create(objects: &Objects, id: &str, edge: u8) -> Result<Listed, ServiceError>
         labels: labels(edge),
         request: None,
         mesh: fields.mesh.into(),
+        caller: Caller::default(),
     };
     objects.insert(object, origin)
 }
@@ -246,6 +248,7 @@ fn an_object_that_no_call_waits_for_any_more_stays_at_rest() {
 fn a_record_of_another_object_or_version_is_found() {
     let record = Record {
         labels: labels(7),
+        owner: Owner::named("studio"),
         etag: "1-2".to_owned(),
         created: SystemTime::UNIX_EPOCH,
         updated: SystemTime::UNIX_EPOCH,

@@ -1,6 +1,6 @@
 //! Records of version 0.1, which are read, but not written: most of their fields have other numbers.
 
-use grasp_proto::v1;
+use grasp_proto::{has_too_many_parts, v1};
 use prost::Message;
 
 use crate::{
@@ -123,7 +123,9 @@ struct Origin {
 /// The object of an old record, and the centre of mass that its client gave.
 pub(super) fn read(record: &[u8]) -> Option<(v1::GraspObject, Option<v1::Vector3>)> {
     let OldRecord { given, found } = OldRecord::decode(record).ok()?;
-    let mut object = v1::GraspObject::decode(&*move_fields(record, OBJECT)?).ok()?;
+    let object =
+        move_fields(record, OBJECT).filter(|object| !has_too_many_parts::<v1::GraspObject>(object))?;
+    let mut object = v1::GraspObject::decode(&*object).ok()?;
     object.name = name_of(&object.name);
     object.meters_per_unit.get_or_insert(1.0);
     object.z_up = given.up_axis == Z_UP;

@@ -10,7 +10,8 @@ use uuid::Uuid;
 
 use super::{Event, cache::Cache, loading::Load, watching::Watcher};
 use crate::{
-    error::ServiceError,
+    access::{Caller, Owner},
+    error::{Quota, ServiceError},
     objects::{Body, Listed, name_of, saved::MeshHash},
     validate::RequestKey,
 };
@@ -21,8 +22,8 @@ const REMEMBERED_EVICTIONS: usize = 1024;
 #[derive(Debug, Default)]
 pub(super) struct Created {
     pub objects: BTreeMap<String, Entry>,
-    /// Ids of objects by the ids of the requests that created them.
-    pub requests: HashMap<Uuid, String>,
+    /// Ids of objects by the ids of the requests that created them, which are each owner's own.
+    pub requests: HashMap<(Owner, Uuid), String>,
     pub cache: Cache,
     /// Number of objects that are not at rest, and of those about to be added.
     pub loaded: usize,
@@ -45,6 +46,8 @@ pub(super) struct Entry {
     pub request: Option<RequestKey>,
     /// SHA-256 of its mesh file, if it is saved.
     pub mesh: Option<MeshHash>,
+    /// Size of its mesh file in bytes.
+    pub mesh_bytes: u64,
     pub last_used: u64,
     /// True if its record could not be read: of its state, only the id is right.
     pub is_damaged: bool,
@@ -71,6 +74,36 @@ impl Created {
             evicted: evicted.iter().any(|evicted| evicted == id),
         };
         self.objects.get_mut(id).ok_or_else(not_found)
+    }
+
+    /// Checks the quotas of a client that is about to create an object with a mesh file of so many bytes.
+    pub(super) fn check_quotas(&self, caller: &Caller, more_bytes: u64) -> Result<(), ServiceError> {
+        let (owner, quotas) = (caller.owner(), caller.quotas());
+        let own = self
+            .objects
+            .values()
+            .filter(|entry| entry.state.record.owner == owner);
+        // Only clients with a quota pay for counting.
+        let exceeded = |quota, maximum: u64| ServiceError::QuotaExceeded {
+            quota,
+            maximum,
+            retry_after: None,
+        };
+        if let Some(most) = quotas.objects
+            && own.clone().count() >= most
+        {
+            return Err(exceeded(Quota::Objects, most as u64));
+        }
+        if let Some(most) = quotas.bytes
+            && own
+                .map(|entry| entry.mesh_bytes)
+                .sum::<u64>()
+                .saturating_add(more_bytes)
+                > most
+        {
+            return Err(exceeded(Quota::Bytes, most));
+        }
+        Ok(())
     }
 
     pub(super) fn tick(&mut self) -> u64 {
@@ -110,7 +143,8 @@ impl Created {
         let id = entry.state.id().to_owned();
         self.count(&entry.state);
         if let Some(request) = &entry.request {
-            self.requests.insert(request.id, id.clone());
+            let owner = entry.state.record.owner.clone();
+            self.requests.insert((owner, request.id), id.clone());
         }
         self.evicted.retain(|evicted| *evicted != id);
         self.objects.insert(id, entry);
@@ -139,7 +173,8 @@ impl Created {
                 self.cache.forget(object);
             }
             if let Some(request) = entry.request {
-                self.requests.remove(&request.id);
+                let owner = entry.state.record.owner.clone();
+                self.requests.remove(&(owner, request.id));
             }
         }
     }

@@ -13,6 +13,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::{Entry, Event, ObjectStore};
 use crate::{
+    access::Owner,
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
     objects::{
@@ -263,12 +264,15 @@ fn resting_entry(id: &str, saved: Option<SavedObject>) -> Entry {
     let is_damaged = record.is_none();
     let record = record.unwrap_or_else(|| Record {
         labels: Labels::new(),
+        // Nobody knows any more.
+        owner: Owner::default(),
         etag: String::new(),
         created: UNIX_EPOCH,
         updated: UNIX_EPOCH,
     });
     let request = saved.as_ref().and_then(SavedObject::request_key);
     let mesh = saved.as_ref().map(SavedObject::mesh_hash);
+    let mesh_bytes = saved.as_ref().map_or(0, SavedObject::mesh_bytes);
     let warning = "its record is damaged or missing; put the file back, or delete the object";
     let damaged = || v1::GraspObject {
         name: name_of(id),
@@ -283,6 +287,7 @@ fn resting_entry(id: &str, saved: Option<SavedObject>) -> Entry {
         },
         request,
         mesh,
+        mesh_bytes,
         last_used: 0,
         is_damaged,
     }

@@ -37,6 +37,7 @@ use super::{
     saved::{MeshHash, MeshUses, SavedObject, SavedObjects, log_damage},
 };
 use crate::{
+    access::{Caller, Owner},
     error::ServiceError,
     limits::StoreLimits,
     saved::{NotCreated, wait_for},
@@ -68,6 +69,8 @@ pub(crate) struct Origin {
     pub request: Option<RequestKey>,
     /// The mesh file.
     pub mesh: Bytes,
+    /// Who creates it, and owns it then.
+    pub caller: Caller,
 }
 
 pub(crate) fn is_built_in(id: &str) -> bool {
@@ -89,7 +92,13 @@ impl ObjectStore {
         let now = SystemTime::now();
         let mut created = Created::new(now);
         let pinned = built_in.chain(directory).map(|pinned| {
-            let state = new_state(pinned.object, pinned.labels, created.next_etag(), now);
+            let state = new_state(
+                pinned.object,
+                pinned.labels,
+                created.next_etag(),
+                now,
+                Owner::default(),
+            );
             (state.id().to_owned(), state)
         });
         Self {
@@ -121,23 +130,20 @@ impl ObjectStore {
     ///
     /// # Errors
     /// - [`ServiceError::ObjectExists`] if the id is taken.
-    /// - [`ServiceError::RequestIdReused`] if a request with the same id and other content created an object.
-    pub(crate) fn repeated(
-        &self,
-        id: &str,
-        request: Option<&RequestKey>,
-    ) -> Result<Option<Listed>, ServiceError> {
-        self.repeated_in(&self.created(), id, request)
+    /// - [`ServiceError::RequestIdReused`] if a request of the same owner with the same id and other content created an object.
+    /// - [`ServiceError::QuotaExceeded`].
+    pub(crate) fn repeated(&self, id: &str, origin: &Origin) -> Result<Option<Listed>, ServiceError> {
+        self.repeated_in(&self.created(), id, origin)
     }
 
     fn repeated_in(
         &self,
         created: &Created,
         id: &str,
-        request: Option<&RequestKey>,
+        origin: &Origin,
     ) -> Result<Option<Listed>, ServiceError> {
-        if let Some(request) = request
-            && let Some(of) = created.requests.get(&request.id)
+        if let Some(request) = &origin.request
+            && let Some(of) = created.requests.get(&(origin.caller.owner(), request.id))
         {
             let entry = created.objects.get(of);
             return match entry.filter(|entry| entry.request.as_ref() == Some(request)) {
@@ -151,6 +157,7 @@ impl ObjectStore {
         if self.pinned.contains_key(id) || created.objects.contains_key(id) {
             return Err(ServiceError::ObjectExists { name: name_of(id) });
         }
+        created.check_quotas(&origin.caller, origin.mesh.len() as u64)?;
         Ok(None)
     }
 
@@ -165,7 +172,7 @@ impl ObjectStore {
         let reserved;
         let state = {
             let mut created = self.created();
-            if let Some(state) = self.repeated_in(&created, &object.id, origin.request.as_ref())? {
+            if let Some(state) = self.repeated_in(&created, &object.id, &origin)? {
                 return Ok(state);
             }
             if let Some(&SavedObjects { maximum, .. }) = self.saved.as_ref()
@@ -174,10 +181,17 @@ impl ObjectStore {
                 return Err(ServiceError::ObjectsFull { maximum });
             }
             let etag = created.next_etag();
-            let state = new_state(object, origin.labels, etag, SystemTime::now());
+            let state = new_state(
+                object,
+                origin.labels,
+                etag,
+                SystemTime::now(),
+                origin.caller.owner(),
+            );
             reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
             state
         };
+        let mesh_bytes = origin.mesh.len() as u64;
         let saved = self.save_new(&mut mesh_uses, &state, origin.request, origin.mesh);
         let mut created = self.created();
         reserved.release(&mut created);
@@ -188,6 +202,7 @@ impl ObjectStore {
             state: state.clone(),
             request: origin.request,
             mesh,
+            mesh_bytes,
             last_used,
             is_damaged: false,
         });
@@ -238,6 +253,13 @@ impl ObjectStore {
         }
     }
 
+    /// Checks that an object, if it exists, does not belong to another client.
+    pub(crate) fn check_owned(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
+        let created = self.created();
+        let owner = created.objects.get(id).map(|entry| &entry.state.record.owner);
+        owner.map_or(Ok(()), |owner| caller.check_owns(&name_of(id), owner))
+    }
+
     /// The object with this id if a client may change it and it has the given etag.
     ///
     /// # Errors
@@ -271,6 +293,7 @@ impl ObjectStore {
             let before = created.entry_with(id, Some(&base.record.etag))?.state.clone();
             let record = Arc::new(Record {
                 labels,
+                owner: before.record.owner.clone(),
                 etag,
                 created: before.record.created,
                 // The system's clock may have been set back.
@@ -372,11 +395,12 @@ impl ObjectStore {
     }
 }
 
-fn new_state(object: StoredObject, labels: Labels, etag: String, now: SystemTime) -> Listed {
+fn new_state(object: StoredObject, labels: Labels, etag: String, now: SystemTime, owner: Owner) -> Listed {
     Listed {
         body: Body::Loaded(Arc::new(object)),
         record: Arc::new(Record {
             labels,
+            owner,
             etag,
             created: now,
             updated: now,

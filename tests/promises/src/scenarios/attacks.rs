@@ -7,8 +7,8 @@ use tokio::{io::AsyncWriteExt as _, net::TcpStream, task::JoinHandle};
 
 use crate::{
     Failure,
-    bench::{Bench, DEADLINE},
-    load::{Call, HEAVY, LIGHT, OpenLoop, connect, find_grasp},
+    bench::Bench,
+    load::{Call, HEAVY, LIGHT, find_grasp, open_loop},
     report::{Row, Unit},
 };
 
@@ -30,8 +30,7 @@ const SLOW: usize = 100;
 
 pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let server = bench.server(&["--builder-threads", "1"])?;
-    let channels = connect(server.address, LIGHT, 4).await?;
-    let call = find_grasp(&channels, &bench.requests.warm);
+    let call = find_grasp(server.address, LIGHT, &bench.requests.warm).await?;
     // Reads atlases, and learns grips where they have none.
     beside(&call, Duration::from_secs(2)).await;
     let before = server.resident_bytes()?;
@@ -80,14 +79,9 @@ pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
 
 /// The p99 of the bystander's calls for some time, in milliseconds.
 async fn beside(call: &Call, length: Duration) -> f64 {
-    let load = OpenLoop {
-        rate: RATE,
-        length,
-        deadline: DEADLINE,
-        tries: 1,
-        seed: 1,
-    };
-    load.run(call.clone()).await.latency_ms(0.99, |_| true)
+    open_loop(call.clone(), RATE, length, 1)
+        .await
+        .latency_ms(0.99, |_| true)
 }
 
 /// Floods on one connection after the other; how many were cut off, and the rounds sent in all.

@@ -36,7 +36,7 @@ enum Exit {
 
 pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let server = bench.server(NO_ATLASES)?;
-    let channel = connect(server.address, LIGHT, 1).await?[0].clone();
+    let channel = connect(server.address, LIGHT).await?;
     let hopeless = impossible(&channel, Duration::from_secs(10)).await?;
     let repeats = if bench.long { 200 } else { 30 };
     let mut rows = Vec::new();

@@ -6,14 +6,17 @@ use grasp_client::v1::{self, object_service_client::ObjectServiceClient};
 
 use crate::{
     Failure,
-    bench::{Bench, DEADLINE},
-    load::{End, LIGHT, OpenLoop, connect, find_grasp},
+    bench::Bench,
+    load::{End, LIGHT, connect, find_grasp, open_loop},
     report::{Row, Unit},
     requests::BOX_OBJ,
 };
 
 /// Warm calls per second.
 const WARM_RATE: f64 = 300.0;
+
+/// Calls before those that are measured.
+const WARM_UP: Duration = Duration::from_secs(2);
 
 pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     Ok(vec![cores(bench).await?, memory(bench).await?])
@@ -22,20 +25,12 @@ pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
 /// Cores per thousand warm calls a second.
 async fn cores(bench: &Bench) -> Result<Row, Failure> {
     let server = bench.server(&["--builder-threads", "1"])?;
-    let channels = connect(server.address, LIGHT, 4).await?;
-    let call = find_grasp(&channels, &bench.requests.warm);
+    let call = find_grasp(server.address, LIGHT, &bench.requests.warm).await?;
     bench.step("cores of warm calls");
-    let load = |seconds, seed| OpenLoop {
-        rate: WARM_RATE,
-        length: Duration::from_secs(seconds),
-        deadline: DEADLINE,
-        tries: 1,
-        seed,
-    };
     // Reads atlases, and learns grips where they have none.
-    load(2, 1).run(call.clone()).await;
+    open_loop(call.clone(), WARM_RATE, WARM_UP, 1).await;
     let before = server.usage()?;
-    let tally = load(if bench.long { 30 } else { 4 }, 2).run(call).await;
+    let tally = open_loop(call, WARM_RATE, bench.seconds(30, 4), 1).await;
     let cores = server.spent_since(&before)?.total() / tally.seconds;
     let answered = tally.count(|end| matches!(end, End::Served | End::Unfound)) as f64 / tally.seconds;
     Ok(Row::stated(
@@ -53,7 +48,7 @@ async fn cores(bench: &Bench) -> Result<Row, Failure> {
 /// Memory per thousand small objects.
 async fn memory(bench: &Bench) -> Result<Row, Failure> {
     let server = bench.server(&["--builder-threads", "0"])?;
-    let mut client = ObjectServiceClient::new(connect(server.address, LIGHT, 1).await?[0].clone());
+    let mut client = ObjectServiceClient::new(connect(server.address, LIGHT).await?);
     let count = if bench.long { 1000 } else { 300 };
     bench.step(format_args!("memory of {count} objects"));
     let before = server.resident_bytes()?;

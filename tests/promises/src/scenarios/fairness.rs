@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use crate::{
     Failure,
-    bench::{Bench, DEADLINE, NO_ATLASES},
-    load::{LIGHT, OpenLoop, Tally, connect, find_grasp},
+    bench::{Bench, NO_ATLASES},
+    load::{Call, LIGHT, find_grasp, open_loop},
     report::{Row, Unit},
     server::ServerProcess,
 };
@@ -63,17 +63,19 @@ pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let saturation = bench.saturation().await?;
     let server = bench.server(NO_ATLASES)?;
     bench.step("fairness: a light client alone");
-    let solo = light(bench, &server, LIGHT_SHARE * saturation).await?;
+    let searches = light(bench, &server).await?;
+    let solo = open_loop(searches, LIGHT_SHARE * saturation, length(bench), 1).await;
     let mut rows = Vec::new();
     for resource in Resource::ALL {
         bench.step(format_args!("fairness: {resource:?}"));
         // A server of its own, so that nothing is left of the attack before.
         let server = bench.server(NO_ATLASES)?;
         let modest = modest::Modest::new(&server, resource).await?;
+        let searches = light(bench, &server).await?;
         let greedy = greedy::attack(bench, &server, resource, 10.0 * saturation).await?;
         tokio::time::sleep(TAKES).await;
         let probes = tokio::spawn(modest.uses(PROBE_EVERY, length(bench)));
-        let beside = light(bench, &server, LIGHT_SHARE * saturation).await?;
+        let beside = open_loop(searches, LIGHT_SHARE * saturation, length(bench), 1).await;
         let probes = probes.await?;
         drop(greedy);
         let of_solo = beside.goodput() / solo.goodput();
@@ -98,15 +100,7 @@ fn length(bench: &Bench) -> Duration {
     bench.seconds(20, 3)
 }
 
-/// The light client's searches; the same ones each time.
-async fn light(bench: &Bench, server: &ServerProcess, rate: f64) -> Result<Tally, Failure> {
-    let channels = connect(server.address, LIGHT, 2).await?;
-    let load = OpenLoop {
-        rate,
-        length: length(bench),
-        deadline: DEADLINE,
-        tries: 1,
-        seed: 7,
-    };
-    Ok(load.run(find_grasp(&channels, &bench.requests.searching)).await)
+/// The light client's searches.
+async fn light(bench: &Bench, server: &ServerProcess) -> Result<Call, Failure> {
+    Ok(find_grasp(server.address, LIGHT, &bench.requests.searching).await?)
 }

@@ -6,8 +6,8 @@ use grasp_client::v1::FindGraspRequest;
 
 use crate::{
     Failure,
-    bench::{Bench, CONNECTIONS, DEADLINE, NO_ATLASES, Placement},
-    load::{End, LIGHT, OpenLoop, Tally, connect, find_grasp},
+    bench::{Bench, NO_ATLASES, Placement},
+    load::{End, LIGHT, Tally, find_grasp, open_loop},
     report::{Row, Unit},
     requests::Requests,
 };
@@ -120,21 +120,15 @@ async fn curve(
     multiples: &[u32],
 ) -> Result<Curve, Failure> {
     let server = bench.server_at(placement, flags)?;
-    let channels = connect(server.address, LIGHT, CONNECTIONS).await?;
-    let call = find_grasp(&channels, requests);
+    let call = find_grasp(server.address, LIGHT, requests).await?;
     bench.step("saturation");
-    let saturated = bench.saturate(call.clone(), placement).await;
+    let saturated = bench.saturate(call.clone(), placement).await?;
     let mut at_multiples = Vec::new();
     for &multiple in multiples {
         bench.step(format_args!("goodput at {multiple} ×"));
-        let load = OpenLoop {
-            rate: f64::from(multiple) * saturated.goodput(),
-            length: bench.seconds(30, 3),
-            deadline: DEADLINE,
-            tries: 1,
-            seed: multiple.into(),
-        };
-        at_multiples.push((multiple, load.run(call.clone()).await));
+        let rate = f64::from(multiple) * saturated.goodput();
+        let load = open_loop(call.clone(), rate, bench.seconds(30, 3), 1);
+        at_multiples.push((multiple, load.await));
     }
     Ok(Curve {
         saturated,

@@ -8,8 +8,8 @@ use tonic_health::pb::{
 
 use crate::{
     Failure,
-    bench::{Bench, CONNECTIONS, DEADLINE, NO_ATLASES},
-    load::{HEAVY, LIGHT, OpenLoop, connect, find_grasp, milliseconds},
+    bench::{Bench, NO_ATLASES},
+    load::{HEAVY, LIGHT, connect, find_grasp, milliseconds, open_loop},
     report::{Row, Unit, quantile},
 };
 
@@ -22,20 +22,10 @@ const PAUSE: Duration = Duration::from_millis(10);
 pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let rate = 10.0 * bench.saturation().await?;
     let server = bench.server(NO_ATLASES)?;
-    let mut client = HealthClient::new(connect(server.address, LIGHT, 1).await?[0].clone());
-    let heavy = connect(server.address, HEAVY, CONNECTIONS).await?;
-    let load = OpenLoop {
-        rate,
-        length: bench.seconds(60, 4),
-        deadline: DEADLINE,
-        tries: 1,
-        seed: 1,
-    };
+    let mut client = HealthClient::new(connect(server.address, LIGHT).await?);
+    let searches = find_grasp(server.address, HEAVY, &bench.requests.searching).await?;
     bench.step("health at 10 ×");
-    let overload = tokio::spawn({
-        let (load, call) = (load.clone(), find_grasp(&heavy, &bench.requests.searching));
-        async move { load.run(call).await }
-    });
+    let overload = tokio::spawn(open_loop(searches, rate, bench.seconds(60, 4), 1));
     let (mut times, mut wrong) = (Vec::new(), Vec::new());
     while !overload.is_finished() {
         tokio::time::sleep(PAUSE).await;

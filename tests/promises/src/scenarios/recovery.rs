@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use crate::{
     Failure,
-    bench::{Bench, CONNECTIONS, DEADLINE},
-    load::{End, HEAVY, LIGHT, OpenLoop, Tally, connect, find_grasp},
+    bench::Bench,
+    load::{End, HEAVY, LIGHT, Tally, find_grasp, open_loop},
     report::{Row, Unit},
 };
 
@@ -28,32 +28,19 @@ const STEP: Duration = Duration::from_millis(100);
 pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let rate = 10.0 * bench.saturation().await?;
     let server = bench.server(&[])?;
-    let light = connect(server.address, LIGHT, 2).await?;
-    let heavy = connect(server.address, HEAVY, CONNECTIONS).await?;
-    let overload = OpenLoop {
-        rate,
-        length: bench.seconds(60, 10),
-        deadline: DEADLINE,
-        tries: 1,
-        seed: 1,
-    };
-    let baseline = OpenLoop {
-        rate: LIGHT_RATE,
-        length: AROUND + overload.length + AROUND,
-        deadline: DEADLINE,
-        tries: 1,
-        seed: 2,
-    };
+    let warm = find_grasp(server.address, LIGHT, &bench.requests.warm).await?;
+    let searches = find_grasp(server.address, HEAVY, &bench.requests.searching).await?;
+    let length = bench.seconds(60, 10);
+    let end = AROUND + length;
     bench.step("recovery after 10 ×");
-    let light = baseline.run(find_grasp(&light, &bench.requests.warm));
+    let light = open_loop(warm, LIGHT_RATE, end + AROUND, 1);
     let heavy = async {
         tokio::time::sleep(AROUND).await;
-        overload.run(find_grasp(&heavy, &bench.requests.searching)).await
+        open_loop(searches, rate, length, 1).await
     };
     let (light, heavy) = tokio::join!(light, heavy);
     let before = windows(&light, Duration::ZERO, AROUND);
     let usual = before.iter().map(|&(_, p99)| p99).fold(0.0, f64::max);
-    let end = AROUND + overload.length;
     let after = windows(&light, end, end + AROUND);
     let back = after.iter().find(|&&(_, p99)| p99 <= SLACK * usual);
     let first = after.first().map_or(f64::NAN, |&(_, p99)| p99);
@@ -61,7 +48,9 @@ pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
         "recovery from 10 ×",
         Unit::Seconds,
         BACK_AFTER_S,
-        back.map_or(f64::INFINITY, |&(start, _)| (start - end).as_secs_f64()),
+        back.map_or(f64::INFINITY, |&(start, _)| {
+            start.saturating_sub(end).as_secs_f64()
+        }),
         format!(
             "until p99 of {LIGHT_RATE}/s warm calls within {WINDOW:?} is at most {SLACK} × the worst of {AROUND:?} before, {usual:.1} ms; \
              at first {first:.1} ms; overload: {}",

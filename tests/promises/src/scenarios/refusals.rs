@@ -6,8 +6,8 @@ use grasp_client::v1::grasp_service_client::GraspServiceClient;
 
 use crate::{
     Failure,
-    bench::{Bench, CONNECTIONS, DEADLINE, NO_ATLASES, Placement},
-    load::{End, HEAVY, LIGHT, OpenLoop, connect, find_grasp},
+    bench::{Bench, NO_ATLASES, Placement},
+    load::{End, HEAVY, LIGHT, connect, find_grasp, open_loop},
     report::{Row, Unit},
     requests::impossible,
 };
@@ -24,22 +24,14 @@ const REFUSED_RATE: f64 = 500.0;
 pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let rate = 10.0 * bench.saturation().await?;
     let server = bench.server(NO_ATLASES)?;
-    let channels = connect(server.address, LIGHT, CONNECTIONS).await?;
-    let call = find_grasp(&channels, &bench.requests.searching);
+    let call = find_grasp(server.address, LIGHT, &bench.requests.searching).await?;
     bench.step("cost of served calls");
     let before = server.usage()?;
-    let saturated = bench.saturate(call.clone(), Placement::Apart).await;
+    let saturated = bench.saturate(call.clone(), Placement::Apart).await?;
     let served = saturated.count(|end| matches!(end, End::Served | End::Unfound)) as f64;
     let cost_served = server.spent_since(&before)?.total() / served;
     bench.step("refusals at 10 ×");
-    let load = OpenLoop {
-        rate,
-        length: bench.seconds(30, 3),
-        deadline: DEADLINE,
-        tries: 1,
-        seed: 1,
-    };
-    let tally = load.run(call).await;
+    let tally = open_loop(call, rate, bench.seconds(30, 3), 1).await;
     let latency = tally.latency_ms(0.99, |end| end == End::Refused);
     let (cost_refused, count) = cost_of_refusal(bench).await?;
     Ok(vec![
@@ -69,9 +61,9 @@ async fn cost_of_refusal(bench: &Bench) -> Result<(f64, usize), Failure> {
     let mut flags = NO_ATLASES.to_vec();
     flags.extend(["--maximum-searches", "1", "--maximum-budget-ms", "600000"]);
     let server = bench.server(&flags)?;
-    let channels = connect(server.address, LIGHT, CONNECTIONS).await?;
-    let other = connect(server.address, HEAVY, 1).await?[0].clone();
-    let hopeless = impossible(&other, Duration::from_secs(600)).await?;
+    let call = find_grasp(server.address, LIGHT, &bench.requests.searching).await?;
+    let other = connect(server.address, HEAVY).await?;
+    let hopeless = impossible(&other, Duration::from_mins(10)).await?;
     bench.step("cost of refusals");
     let occupying = tokio::spawn(async move { GraspServiceClient::new(other).find_grasp(hopeless).await });
     tokio::time::sleep(Duration::from_millis(300)).await;
@@ -80,14 +72,7 @@ async fn cost_of_refusal(bench: &Bench) -> Result<(f64, usize), Failure> {
     tokio::time::sleep(length).await;
     let idle = server.spent_since(&before)?.other;
     let before = server.usage()?;
-    let load = OpenLoop {
-        rate: REFUSED_RATE,
-        length,
-        deadline: DEADLINE,
-        tries: 1,
-        seed: 2,
-    };
-    let tally = load.run(find_grasp(&channels, &bench.requests.searching)).await;
+    let tally = open_loop(call, REFUSED_RATE, length, 1).await;
     let spent = server.spent_since(&before)?.other - idle;
     occupying.abort();
     let refused = tally.count(|end| end == End::Refused);

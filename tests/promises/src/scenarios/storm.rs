@@ -2,8 +2,8 @@
 
 use crate::{
     Failure,
-    bench::{Bench, CONNECTIONS, DEADLINE, NO_ATLASES, Placement},
-    load::{LIGHT, OpenLoop, connect, find_grasp},
+    bench::{Bench, NO_ATLASES, Placement},
+    load::{LIGHT, find_grasp, open_loop},
     report::{Row, Unit},
 };
 
@@ -15,19 +15,11 @@ const TRIES: usize = 3;
 
 pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let server = bench.server(NO_ATLASES)?;
-    let channels = connect(server.address, LIGHT, CONNECTIONS).await?;
-    let call = find_grasp(&channels, &bench.requests.searching);
+    let call = find_grasp(server.address, LIGHT, &bench.requests.searching).await?;
     bench.step("saturation");
-    let saturated = bench.saturate(call.clone(), Placement::Apart).await.goodput();
-    let load = OpenLoop {
-        rate: 2.0 * saturated,
-        length: bench.seconds(30, 3),
-        deadline: DEADLINE,
-        tries: TRIES,
-        seed: 1,
-    };
+    let saturated = bench.saturate(call.clone(), Placement::Apart).await?.goodput();
     bench.step("retry storm at 2 ×");
-    let tally = load.run(call).await;
+    let tally = open_loop(call, 2.0 * saturated, bench.seconds(30, 3), TRIES).await;
     Ok(vec![Row::at_least(
         "goodput in a retry storm at 2 ×",
         Unit::Share,

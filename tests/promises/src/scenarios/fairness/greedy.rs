@@ -11,17 +11,20 @@ use grasp_tests::raw::{Connection, framed};
 use tokio::{task::JoinSet, time::sleep};
 use tonic::transport::Channel;
 
-use super::{Resource, modest::new_rig};
+use super::{
+    Resource,
+    modest::{new_rig, read_all},
+};
 use crate::{
     Failure,
-    bench::{Bench, CONNECTIONS, DEADLINE, WINDOW},
-    load::{Call, HEAVY, OpenLoop, connect, find_grasp, socket, within},
+    bench::{Bench, WINDOW},
+    load::{Call, HEAVY, connect_all, find_grasp, open_loop, socket, within},
     requests::{BOX_OBJ, adult_joints},
     server::ServerProcess,
 };
 
 /// Longest attack.
-const ENDS_AFTER: Duration = Duration::from_secs(120);
+const ENDS_AFTER: Duration = Duration::from_mins(2);
 
 /// Pause after a refusal, of each task that tries again.
 const RETRIES_AFTER: Duration = Duration::from_millis(100);
@@ -60,23 +63,16 @@ pub(super) async fn attack(
 ) -> Result<JoinSet<()>, Failure> {
     let address = server.address;
     let mut tasks = JoinSet::new();
-    let channels = connect(address, HEAVY, CONNECTIONS).await?;
-    let load = OpenLoop {
-        rate,
-        length: ENDS_AFTER,
-        deadline: DEADLINE,
-        tries: 1,
-        seed: 9,
-    };
+    let channels = connect_all(address, HEAVY).await?;
     match resource {
         Resource::Searches => {
-            let call = find_grasp(&channels, &bench.requests.searching);
-            tasks.spawn(async move { drop(load.run(call).await) });
+            let call = find_grasp(address, HEAVY, &bench.requests.searching).await?;
+            tasks.spawn(async move { drop(open_loop(call, rate, ENDS_AFTER, 1).await) });
         }
         Resource::Streams => hold(&mut tasks, &channels, stream),
         Resource::Tracks => {
             let call = push_frames(&channels, create_tracks(&channels).await?);
-            tasks.spawn(async move { drop(load.run(call).await) });
+            tasks.spawn(async move { drop(open_loop(call, rate, ENDS_AFTER, 1).await) });
         }
         Resource::Uploads => {
             for number in 0..UPLOADS {
@@ -143,22 +139,14 @@ where
 async fn stream(channel: Channel) -> Result<(), Failure> {
     let hopeless = v1::FindGraspRequest::new("objects/untouchable").with_budget(STREAM_BUDGET);
     let request = v1::StreamGraspsRequest::from(hopeless);
-    let mut answers = GraspServiceClient::new(channel)
-        .stream_grasps(request)
-        .await?
-        .into_inner();
-    while answers.message().await?.is_some() {}
-    Ok(())
+    let answers = GraspServiceClient::new(channel).stream_grasps(request).await?;
+    Ok(read_all(answers.into_inner()).await?)
 }
 
 async fn watch(channel: Channel) -> Result<(), Failure> {
     let all = v1::WatchObjectsRequest::default();
-    let mut changes = ObjectServiceClient::new(channel)
-        .watch_objects(all)
-        .await?
-        .into_inner();
-    while changes.message().await?.is_some() {}
-    Ok(())
+    let changes = ObjectServiceClient::new(channel).watch_objects(all).await?;
+    Ok(read_all(changes.into_inner()).await?)
 }
 
 /// Names of as many tracks as the server gives, up to [`TRACKS`].

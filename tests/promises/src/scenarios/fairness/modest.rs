@@ -10,18 +10,21 @@ use grasp_client::v1::{
     self, grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
     object_service_client::ObjectServiceClient,
 };
-use tonic::{Status, transport::Channel};
+use tonic::{Status, Streaming, transport::Channel};
 
 use super::Resource;
 use crate::{
     Failure,
-    load::{LIGHT, connect, within},
+    load::{LIGHT, connect},
     requests::{BOX_OBJ, adult_joints, impossible},
     server::ServerProcess,
 };
 
-/// The deadline of a call.
+/// Longest time of a use.
 const DEADLINE: Duration = Duration::from_secs(1);
+
+/// The object of its calls.
+const REMOTE: &str = "objects/remote";
 
 /// The budget of a stream of grasps.
 const BUDGET: Duration = Duration::from_millis(20);
@@ -66,7 +69,7 @@ impl fmt::Display for Uses {
 impl Modest {
     /// Connects, and creates the object of [`impossible`].
     pub(super) async fn new(server: &ServerProcess, resource: Resource) -> Result<Self, Failure> {
-        let channel = connect(server.address, LIGHT, 1).await?[0].clone();
+        let channel = connect(server.address, LIGHT).await?;
         impossible(&channel, BUDGET).await?;
         let joints = adult_joints(&channel).await?;
         Ok(Self {
@@ -103,81 +106,66 @@ impl Modest {
             // Its searches are the light load itself.
             Resource::Searches => {}
             Resource::Streams => {
-                let request = v1::FindGraspRequest::new("objects/remote").with_budget(BUDGET);
-                let request = v1::StreamGraspsRequest::from(request);
-                let mut answers = grasps
-                    .stream_grasps(within(DEADLINE, request))
-                    .await?
-                    .into_inner();
-                while answers.message().await?.is_some() {}
+                let request = v1::FindGraspRequest::new(REMOTE).with_budget(BUDGET);
+                let answers = grasps
+                    .stream_grasps(v1::StreamGraspsRequest::from(request))
+                    .await?;
+                read_all(answers.into_inner()).await?;
             }
             Resource::Tracks => {
-                let name = grasps
-                    .create_track(within(DEADLINE, v1::Track::new("objects/remote")))
-                    .await?;
-                let name = name.into_inner().name;
+                let track = grasps.create_track(v1::Track::new(REMOTE)).await?;
+                let name = track.into_inner().name;
                 let frame = v1::TrackFrame {
                     track: name.clone(),
                     sequence: 1,
                     ..Default::default()
                 };
-                grasps.push_frame(within(DEADLINE, frame)).await?;
+                grasps.push_frame(frame).await?;
                 grasps.delete_track(v1::DeleteTrackRequest { name }).await?;
             }
             Resource::Uploads => {
                 let created = v1::CreateObjectRequest::new(format!("box-{number}"), BOX_OBJ, 0.1);
-                let name = objects
-                    .create_object(within(DEADLINE, created))
-                    .await?
-                    .into_inner()
-                    .name;
+                let name = objects.create_object(created).await?.into_inner().name;
                 let deleted = v1::DeleteObjectRequest {
                     name,
                     ..Default::default()
                 };
-                objects.delete_object(within(DEADLINE, deleted)).await?;
+                objects.delete_object(deleted).await?;
             }
             Resource::Meshes => {
-                let named = v1::GetMeshRequest {
-                    name: "objects/remote".to_owned(),
-                };
-                let mut pieces = objects.get_mesh(within(DEADLINE, named)).await?.into_inner();
-                while pieces.message().await?.is_some() {}
+                let name = REMOTE.to_owned();
+                read_all(objects.get_mesh(v1::GetMeshRequest { name }).await?.into_inner()).await?;
             }
             Resource::Watches => {
                 let all = v1::WatchObjectsRequest {
                     include_present: true,
                     ..Default::default()
                 };
-                let mut changes = objects.watch_objects(within(DEADLINE, all)).await?.into_inner();
-                changes
-                    .message()
-                    .await?
-                    .ok_or_else(|| Status::internal("no message"))?;
+                let mut changes = objects.watch_objects(all).await?.into_inner();
+                changes.message().await?.ok_or("there is no message")?;
             }
             Resource::Rigs => {
                 let mut rigs = HandRigServiceClient::new(self.channel.clone());
                 let created = new_rig(format!("own-{number}"), &self.joints);
-                let name = rigs
-                    .create_rig(within(DEADLINE, created))
-                    .await?
-                    .into_inner()
-                    .name;
+                let name = rigs.create_rig(created).await?.into_inner().name;
                 rigs.delete_rig(v1::DeleteRigRequest { name }).await?;
             }
             Resource::Connections => {
-                let channel = connect(self.server, LIGHT, 1).await?[0].clone();
                 let named = v1::GetObjectRequest {
-                    name: "objects/remote".to_owned(),
-                    ..Default::default()
+                    name: REMOTE.to_owned(),
                 };
-                ObjectServiceClient::new(channel)
-                    .get_object(within(DEADLINE, named))
-                    .await?;
+                let channel = connect(self.server, LIGHT).await?;
+                ObjectServiceClient::new(channel).get_object(named).await?;
             }
         }
         Ok(())
     }
+}
+
+/// Reads a stream to its end.
+pub(super) async fn read_all<M>(mut messages: Streaming<M>) -> Result<(), Status> {
+    while messages.message().await?.is_some() {}
+    Ok(())
 }
 
 /// A request for a rig with an adult's right hand.

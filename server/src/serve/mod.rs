@@ -1,69 +1,59 @@
 //! Starts, runs and shuts down the server.
 
+mod parts;
+
 use std::{
     future::Future,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{Arc, atomic::AtomicU64},
-    thread,
     time::{Duration, Instant},
 };
 
 use futures_util::future::BoxFuture;
-use grasp_assets::hands::{self, RIG_NAMES};
-use grasp_proto::v1::{
-    grasp_service_server::GraspServiceServer, hand_rig_service_server::HandRigServiceServer,
-    object_service_server::ObjectServiceServer,
-};
-use grasp_synthesis::{base::stop::unstopped, model::hand::Handedness};
+use grasp_synthesis::base::stop::unstopped;
 use tokio::{
     net::TcpListener,
     sync::{Semaphore, watch},
 };
 use tokio_util::sync::CancellationToken;
-use tonic::{codec::CompressionEncoding::Gzip, service::Routes};
+use tonic::service::Routes;
 use tonic_web::GrpcWebLayer;
 use tower::{ServiceBuilder, util::option_layer};
 
+use self::parts::{calls, drain, largest_upload, logged, prepare_hands, reflection, services};
 use crate::{
+    access::Door,
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
-    call::{BySize, Calls},
     config::{Config, StorePlace},
     connect::{Connect, Transcoding},
     error::Limit,
     executor::SearchExecutor,
-    limits::{BYTES_BESIDES_MESH, ClientPermits, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
+    faults::FaultPoint,
+    limits::{ClientPermits, Places},
     listen::Listener,
     middleware::Around,
     monitor::{Monitor, Phase, Vitals, set_health},
     net::{Connections, Lifetime, Serving, UnreadCount, accept},
     objects::{
         derived::Resizer,
-        directory::{self, DirectoryError, PinnedObject},
+        directory::{self, DirectoryError},
         saved::SavedObjects,
         store::ObjectStore,
     },
+    reload::{Reloader, Watched, keep_current},
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
+    tls::Tls,
     traces::Traces,
     track::OpenTracks,
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
 };
 
-type Grasps = GraspServiceServer<Handler>;
-type Objects = ObjectServiceServer<Handler>;
-type Rigs = HandRigServiceServer<Handler>;
-
-/// Time limit of a call beyond the largest budget: enough to read and build a large mesh.
-const CALL_TIME_BEYOND_BUDGET: Duration = Duration::from_secs(20);
-
 /// When a client whose upload was rejected should retry: after about the time of an upload.
 const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
-
-/// Delay between the last response and closing its connection: time to send it, and for the client to close first.
-const LINGER: Duration = Duration::from_millis(200);
 
 /// Why the server ended or did not start.
 #[derive(Debug, thiserror::Error)]
@@ -85,6 +75,9 @@ pub enum ServeError {
         /// The cause.
         source: std::io::Error,
     },
+    /// Files of certificates or tokens cannot be used.
+    #[error("{}", .0.join("\n"))]
+    Secrets(Vec<String>),
     /// The builder threads cannot be started.
     #[error("cannot start the atlas builders: {0}")]
     Builders(std::io::Error),
@@ -100,9 +93,12 @@ pub enum ServeError {
 #[derive(Debug)]
 pub struct Server {
     handler: Handler,
-    builds: Places,
-    /// Where what is saved is kept. `None` for memory.
+    /// `None` if nothing is saved.
     files: Option<Arc<SavedFiles>>,
+    builds: Places,
+    tls: Option<Arc<Tls>>,
+    door: Arc<Door>,
+    reloader: Reloader,
     monitor: Option<Listener>,
 }
 
@@ -161,6 +157,18 @@ impl Server {
     /// # Errors
     /// See [`ServeError`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
+        let tls = config.tls.clone().map(Tls::open).transpose();
+        let takes_certificates = config.tls.as_ref().is_some_and(|tls| tls.client_ca.is_some());
+        let door = Door::open(config.tokens_file.clone(), takes_certificates);
+        let (tls, door) = match (tls, door) {
+            (Ok(tls), Ok(door)) => (tls.map(Arc::new), Arc::new(door)),
+            (tls, door) => {
+                let problems = [tls.err(), door.err()];
+                return Err(ServeError::Secrets(
+                    problems.into_iter().flatten().flatten().collect(),
+                ));
+            }
+        };
         prepare_hands();
         let directory = match &config.objects_directory {
             Some(path) => {
@@ -185,11 +193,13 @@ impl Server {
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let atlas_files = match config.kept_atlases() {
             Some(path) => {
-                let opened = AtlasFiles::open(path.clone(), config.atlas_directory.is_none());
+                let opened = AtlasFiles::open(path.clone());
                 Some(opened.map_err(|source| ServeError::AtlasDirectory { path, source })?)
             }
             None => None,
         };
+        let models = config.maximum_object_bytes.get();
+        let rig_records = files.clone().map(|files| saved_rigs(files, models));
         let builds = Places::new(Limit::Uploads, config.maximum_uploads.get(), RETRY_UPLOAD_AFTER);
         let shared = Shared {
             atlases: Atlases::start(
@@ -201,10 +211,7 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: Arc::new(RigStore::new(
-                config.maximum_rigs.get(),
-                files.clone().map(saved_rigs),
-            )),
+            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), rig_records)),
             resizer: Resizer(Arc::new(Semaphore::new(config.derivations()))),
             executor,
             metrics: Arc::default(),
@@ -215,6 +222,7 @@ impl Server {
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),
             heavy: Arc::new(ClientPermits::new(config.heavy_work())),
+            examining: ClientPermits::new(config.workers.get()),
             ahead: Semaphore::new(1),
             created: AtomicU64::new(0),
             upload_bytes: upload_places(config.streams.upload_bytes.get()),
@@ -230,8 +238,11 @@ impl Server {
         };
         Ok(Self {
             handler: Handler(Arc::new(shared)),
-            builds,
             files,
+            builds,
+            tls,
+            door,
+            reloader: Reloader::default(),
             monitor: None,
         })
     }
@@ -253,6 +264,9 @@ impl Server {
             config,
             ..
         } = &*self.handler;
+        if let Some(files) = &self.files {
+            files.own().await?;
+        }
         let objects = objects.read_saved().await?;
         let rigs = load_saved_rigs(rigs, config.mesh_limits(config.maximum_object_bytes)).await?;
         let (store, milliseconds) = (&config.place, start.elapsed().as_millis());
@@ -264,9 +278,20 @@ impl Server {
         Ok(())
     }
 
+    /// Calls a closure at the points where tests inject faults.
+    #[doc(hidden)]
+    pub fn inject_faults(&self, hook: impl Fn(FaultPoint) + Send + Sync + 'static) {
+        self.handler.executor.faults.set(Box::new(hook));
+    }
+
     /// The server's activity.
     pub fn gauges(&self) -> Gauges {
         Gauges(self.handler.clone())
+    }
+
+    /// Makes the server read its certificates and tokens again.
+    pub fn reloader(&self) -> Reloader {
+        self.reloader.clone()
     }
 
     /// Serves on one or more listeners, which share all limits; see [`run`].
@@ -316,11 +341,19 @@ impl Server {
         let vitals = self.monitored(&close);
         let traces = Traces::start(self.handler.config.otlp_endpoint.as_deref());
         let traces = traces.map_err(ServeError::Traces)?;
-        self.read_saved().await?;
+        if let Err(error) = self.read_saved().await {
+            if let Some(files) = &self.files {
+                files.give_back().await;
+            }
+            return Err(error.into());
+        }
         let Self {
             handler,
-            builds,
             files,
+            builds,
+            tls,
+            door,
+            reloader,
             ..
         } = self;
         let config = &handler.config;
@@ -328,7 +361,7 @@ impl Server {
         let (grasps, objects, rigs) = services(&handler);
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, true, true).await;
-        let watch = Arc::clone(&vitals).watch(handler.executor.clone(), files, health.clone());
+        let watch = Arc::clone(&vitals).watch(handler.executor.clone(), files.clone(), health.clone());
         tokio::spawn(close.clone().run_until_cancelled_owned(watch));
         vitals.enter(Phase::Serving);
 
@@ -351,7 +384,9 @@ impl Server {
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(Around(calls(&handler, builds, &packers, &traces, &drained)))
+            .layer(Around(calls(
+                &handler, &door, builds, &packers, &traces, &drained,
+            )))
             .layer(Around(Transcoding {
                 largest_upload,
                 places: packers,
@@ -359,6 +394,7 @@ impl Server {
             .service(routes.prepare());
         let serving = Serving {
             service,
+            tls: tls.clone(),
             lifetime: Lifetime {
                 idle: config.connection_idle,
                 age: config.connection_age,
@@ -371,6 +407,8 @@ impl Server {
         // Stops all tasks, however this function ends.
         let _builders_end = handler.atlases.stopper();
         let _stop_at_the_end = stop.clone().drop_guard();
+        let mut watched = vec![Watched::new(door)];
+        watched.extend(tls.map(|tls| Watched::new(tls)));
         let shutting_down = async {
             shutdown.await;
             vitals.enter(Phase::Draining);
@@ -380,118 +418,25 @@ impl Server {
             close.cancel();
             std::future::pending::<()>().await;
         };
+        let lost = async {
+            match &files {
+                Some(files) => files.lost().await,
+                None => std::future::pending().await,
+            }
+        };
         tokio::select! {
             () = serving => {}
             () = handler.connections.close_stalled() => {}
+            () = keep_current(watched, reloader) => {}
+            lost = lost => return Err(lost.into()),
             () = shutting_down => {}
+        }
+        if let Some(files) = &files {
+            files.give_back().await;
         }
         // The last calls end with their connections.
         let _ = tokio::task::spawn_blocking(move || traces.finish()).await;
         tracing::info!("stopped");
         Ok(())
-    }
-}
-
-/// The services of the contract, each with the limits of its messages.
-fn services(handler: &Handler) -> (Grasps, BySize<Objects>, BySize<Rigs>) {
-    let largest_upload = largest_upload(&handler.config);
-    let grasps = GraspServiceServer::new(handler.clone())
-        .accept_compressed(Gzip)
-        .max_decoding_message_size(MAX_FIND_REQUEST)
-        .max_encoding_message_size(MAX_RESPONSE);
-    let objects = ObjectServiceServer::new(handler.clone())
-        .accept_compressed(Gzip)
-        .max_encoding_message_size(MAX_RESPONSE);
-    let objects = BySize {
-        small: objects.clone().max_decoding_message_size(MAX_FIND_REQUEST),
-        large: objects.max_decoding_message_size(largest_upload),
-    };
-    let rigs = HandRigServiceServer::new(handler.clone())
-        .accept_compressed(Gzip)
-        .max_encoding_message_size(MAX_RESPONSE);
-    let rigs = BySize {
-        small: rigs.clone().max_decoding_message_size(MAX_FIND_REQUEST),
-        large: rigs.max_decoding_message_size(largest_upload),
-    };
-    (grasps, objects, rigs)
-}
-
-/// Lets running calls end, and then ends the others, too.
-async fn drain(handler: &Handler, drained: &CancellationToken) {
-    let config = &handler.config;
-    tracing::info!(calls = handler.calls.receiver_count(), "draining");
-    drop(handler.atlases.stopper());
-    tokio::time::sleep(config.drain_delay).await;
-    handler.shutdown.cancel();
-    let ended = tokio::time::timeout(config.drain, handler.calls.closed()).await;
-    if ended.is_err() {
-        let calls = handler.calls.receiver_count();
-        tracing::warn!(calls, "the drain time has passed; cutting off running calls");
-    }
-    drained.cancel();
-    tokio::time::sleep(LINGER).await;
-}
-
-fn logged(path: &Path, objects: Vec<PinnedObject>) -> Vec<PinnedObject> {
-    for PinnedObject { object, .. } in &objects {
-        for warning in &object.warnings {
-            tracing::warn!(
-                object = object.name(),
-                warning,
-                "an object of the objects directory has a warning"
-            );
-        }
-    }
-    tracing::info!(directory = %path.display(), objects = objects.len(), "read the objects directory");
-    objects
-}
-
-/// Loads the built-in hands and prepares them for searches. The first call with each hand would otherwise do so,
-/// outside its budget: it takes tenths of a second.
-fn prepare_hands() {
-    thread::scope(|scope| {
-        for rig in RIG_NAMES {
-            for handedness in [Handedness::Left, Handedness::Right] {
-                scope.spawn(move || hands::hand(rig, handedness).map(|hand| hand.rig.oppositions()));
-            }
-        }
-    });
-}
-
-fn reflection() -> tonic_reflection::server::Builder<'static> {
-    tonic_reflection::server::Builder::configure()
-        .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
-        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
-}
-
-/// Largest message of an upload, in bytes.
-fn largest_upload(config: &Config) -> usize {
-    config.maximum_object_bytes.get() + BYTES_BESIDES_MESH
-}
-
-fn calls(
-    handler: &Handler,
-    builds: Places,
-    packers: &Arc<Semaphore>,
-    traces: &Traces,
-    drained: &CancellationToken,
-) -> Calls {
-    let config = &handler.config;
-    Calls {
-        metrics: Arc::clone(&handler.metrics),
-        traces: traces.clone(),
-        in_flight: handler.calls.clone(),
-        executor: handler.executor.clone(),
-        longest_search: config.budgets.maximum,
-        uploads: builds,
-        heavy: Arc::clone(&handler.heavy),
-        reads: Arc::default(),
-        upload_grace: 2 * config.streams.upload_idle,
-        packers: Arc::clone(packers),
-        largest_upload: largest_upload(config),
-        reserve: Arc::clone(&handler.reserve),
-        longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
-        shutdown: handler.shutdown.clone(),
-        drained: drained.clone(),
     }
 }
