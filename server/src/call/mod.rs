@@ -299,15 +299,15 @@ impl OpenCall {
         let began = ended
             .zip(search)
             .and_then(|(ended, search)| ended.checked_sub(search.time));
-        // All of it together, as if the search had waited for its first turn only.
+        // Its turns come one by one; here, all waiting comes first.
         let queue_time = record.queue_time.get().map(|queue_time| queue_time.get());
+        let turn = began
+            .zip(ended)
+            .map(|(began, ended)| ended.min(began + queue_time.unwrap_or_default()));
         let parts = [
             ("preparation", record.preparation.get().copied()),
-            (
-                "queue",
-                began.map(|began| (began, began + queue_time.unwrap_or_default())),
-            ),
-            ("search", began.zip(ended)),
+            ("queue", began.zip(turn)),
+            ("search", turn.zip(ended)),
         ];
         self.traces.record(&CallTrace {
             method: self.path.trim_start_matches('/'),

@@ -24,6 +24,9 @@ const OUTCOMES: [&str; 7] = [
     "NOT_RECEIVABLE",
 ];
 
+/// Largest number that a value of the contract's enums may have, for these to be found; their numbers have gaps.
+const MAX_NUMBER: i32 = 255;
+
 /// Number of codes of a status, from 0.
 const CODES: usize = 17;
 
@@ -91,8 +94,8 @@ impl Default for Metrics {
             };
             CallMetrics::new(path, kind)
         });
-        let checks = (1..).map_while(|number| v1::Check::try_from(number).ok());
-        let reasons = (1..).map_while(|number| v1::ErrorReason::try_from(number).ok());
+        let checks = (1..=MAX_NUMBER).filter_map(|number| v1::Check::try_from(number).ok());
+        let reasons = (1..=MAX_NUMBER).filter_map(|number| v1::ErrorReason::try_from(number).ok());
         Self {
             by_path,
             calls: known.chain([CallMetrics::new("/", UNKNOWN)]).collect(),
@@ -145,13 +148,13 @@ impl Metrics {
         self.search.record(time);
         self.outcomes.add_value(short(outcome));
         if let Some(check) = failed_check {
-            self.failed_checks.add((check as usize).wrapping_sub(1));
+            self.failed_checks.add_value(short(check.as_str_name()));
         }
     }
 
     /// Counts an error that was answered.
     pub(crate) fn refused(&self, reason: v1::ErrorReason) {
-        self.refusals.add((reason as usize).wrapping_sub(1));
+        self.refusals.add_value(short(reason.as_str_name()));
     }
 
     /// Writes all of it.
