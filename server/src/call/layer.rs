@@ -17,7 +17,7 @@ use super::{
     ending::ended_by,
     packing::{accepts_gzip, packing},
     panics::contained,
-    reads::{Reads, is_read},
+    reads::{ReadPlace, Reads, is_read},
     upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
 use crate::{
@@ -26,7 +26,7 @@ use crate::{
     client::Client,
     error::{ServiceError, blame_client},
     executor::SearchExecutor,
-    limits::{ClientPermits, MAX_FIND_REQUEST, Place, Places, locked},
+    limits::{ClientPermits, MAX_FIND_REQUEST, Places, locked},
     metrics::Metrics,
     middleware::{Answer, Middleware, filtered},
     net::{Reader, arriving},
@@ -104,7 +104,7 @@ pub(crate) struct Calls {
 
 impl Calls {
     /// Admits a search, or a call that reads or deletes, which then waits for its turn.
-    fn admit(&self, path: &str, context: &CallContext) -> Result<Option<Place>, ServiceError> {
+    fn admit(&self, path: &str, context: &CallContext) -> Result<Option<ReadPlace>, ServiceError> {
         let client = &context.client;
         if SEARCH_METHODS.contains(&path) {
             let due = context.latest_end(self.longest_search);
@@ -188,13 +188,13 @@ impl Middleware<Body> for Calls {
         let drained = self.drained.clone();
         let answer = async move {
             let turn = match admitted {
-                Some(entered) => Some(reads.turn(entered, &client).await),
+                Some(_) => reads.turn(&client).await,
                 None => None,
             };
             let answer = answer.await?;
-            drop(place);
-            let answer = match turn {
-                Some(turn) => answer.map(|inner| filtered(inner, turn)),
+            drop((place, turn));
+            let answer = match admitted {
+                Some(read) => answer.map(|inner| filtered(inner, read)),
                 None => answer,
             };
             Ok(match reader.map_or(Ok(()), |reader| reader.admit()) {

@@ -46,11 +46,8 @@ pub(crate) struct Reads {
     turns: ClientPermits,
 }
 
-/// The right to handle a call, until the end of its answer.
-pub(super) struct ReadTurn {
-    _place: Place,
-    _turn: Option<OwnedSemaphorePermit>,
-}
+/// The place of a call, until the end of its answer.
+pub(super) struct ReadPlace(Place);
 
 impl Default for Reads {
     fn default() -> Self {
@@ -63,21 +60,18 @@ impl Default for Reads {
 
 impl Reads {
     /// Lets a client's call wait for its turn.
-    pub(super) fn enter(&self, client: &Client) -> Result<Place, ServiceError> {
-        self.places.take(client)
+    pub(super) fn enter(&self, client: &Client) -> Result<ReadPlace, ServiceError> {
+        self.places.take(client).map(ReadPlace)
     }
 
-    /// The turn of a call that has entered, once others of its client have ended.
-    pub(super) async fn turn(&self, entered: Place, client: &Client) -> ReadTurn {
-        ReadTurn {
-            _place: entered,
-            _turn: self.turns.acquire(client).await,
-        }
+    /// A turn for a call that has entered, once others of its client are handled. It must not last until the client has read the
+    /// answer: one that does not read would wait for itself.
+    pub(super) async fn turn(&self, client: &Client) -> Option<OwnedSemaphorePermit> {
+        self.turns.acquire(client).await
     }
 }
 
-/// The turn ends with the body of the answer.
-impl FrameFilter for ReadTurn {
+impl FrameFilter for ReadPlace {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         next_frame(inner, cx)
     }
