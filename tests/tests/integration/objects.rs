@@ -165,7 +165,7 @@ async fn a_repeated_request_answers_the_object_it_created() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn equal_requests_at_the_same_time_create_one_object() {
-    let server = TestServer::start().await;
+    let server = TestServer::start_with(|config| config.maximum_uploads = 16.try_into().unwrap()).await;
     let answers = [(); 4].map(|()| {
         let mut client = server.objects_lazily();
         tokio::spawn(async move { client.create_object(with_request_id(box_request("crate"))).await })
