@@ -39,7 +39,7 @@ fn add(messages: &mut HashMap<String, HashMap<u32, String>>, scope: &str, messag
 }
 
 /// True if a message has more parts than any sensible request. Malformed ones are left to decoding.
-pub(crate) fn has_too_many_parts<M: Name>(message: &[u8]) -> bool {
+pub fn has_too_many_parts<M: Name>(message: &[u8]) -> bool {
     let mut left = MAX_PARTS + 1;
     count(message, MESSAGES.get(&M::full_name()), &mut left);
     left == 0

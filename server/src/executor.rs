@@ -5,7 +5,10 @@
 
 use std::{
     panic::AssertUnwindSafe,
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -20,6 +23,7 @@ use crate::{
     error::{Limit, ServiceError},
     faults::{FaultPoint, Faults},
     limits::{Place, Places},
+    metrics::Histogram,
 };
 
 /// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond
@@ -39,12 +43,30 @@ pub(crate) struct SearchExecutor {
     /// A place per running or waiting job.
     pub places: Places,
     gate: Gate<Client>,
+    /// How long jobs waited for their turns.
+    pub queue: Arc<Histogram>,
+}
+
+/// How long a job has waited for its turns, of which it has one per slice.
+#[derive(Debug, Default)]
+pub(crate) struct QueueTime(AtomicU64);
+
+impl QueueTime {
+    fn add(&self, time: Duration) {
+        let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+        self.0.fetch_add(ns, Ordering::Relaxed);
+    }
+
+    pub(crate) fn get(&self) -> Duration {
+        Duration::from_nanos(self.0.load(Ordering::Relaxed))
+    }
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
 #[derive(Debug)]
 pub(crate) struct Admission {
     job: Arc<Job<Client>>,
+    queue_time: Arc<QueueTime>,
     _place: Place,
     /// Of the client's own quota.
     _own: Option<OwnedSemaphorePermit>,
@@ -61,6 +83,10 @@ impl Admission {
         self.job.set_due(due, yields);
     }
 
+    pub(crate) fn queue_time(&self) -> Arc<QueueTime> {
+        Arc::clone(&self.queue_time)
+    }
+
     /// Ends a job that needed no turn.
     pub(crate) fn done(self) {
         self.job.done();
@@ -72,7 +98,7 @@ impl Admission {
 pub(crate) struct Workers<'a> {
     pool: &'a ThreadPool,
     /// `None` for a job that has the workers for itself.
-    job: Option<&'a Job<Client>>,
+    job: Option<(&'a Job<Client>, &'a QueueTime)>,
 }
 
 impl Workers<'_> {
@@ -84,13 +110,17 @@ impl Workers<'_> {
     /// Does a slice of the job's work when its turn has come. If there is none within `longest`, or the job is over, it has no time
     /// left, which the work notices. The turn lasts until the next slice, or [`Self::end_turn`].
     pub(crate) fn in_turn<T>(self, longest: Option<Duration>, work: impl FnOnce(&ThreadPool) -> T) -> T {
-        self.job.map(|job| job.next_turn(longest));
+        if let Some((job, queue_time)) = self.job {
+            let start = Instant::now();
+            job.next_turn(longest);
+            queue_time.add(start.elapsed());
+        }
         work(self.pool)
     }
 
     /// Leaves the workers to others until the next slice.
     pub(crate) fn end_turn(self) {
-        if let Some(job) = self.job {
+        if let Some((job, _)) = self.job {
             job.end_turn();
         }
     }
@@ -119,6 +149,7 @@ impl SearchExecutor {
             faults: Faults::default(),
             places: Places::new(Limit::Searches, maximum, RETRY_AFTER),
             gate: Gate::new(TURNS),
+            queue: Arc::default(),
         })
     }
 
@@ -129,6 +160,7 @@ impl SearchExecutor {
         let job = job.map_err(|TooLate { expected }| ServiceError::WouldMissDeadline { expected })?;
         Ok(Admission {
             job: Arc::new(job),
+            queue_time: Arc::default(),
             _place: place,
             _own: None,
         })
@@ -138,13 +170,19 @@ impl SearchExecutor {
         self.pool.current_num_threads()
     }
 
+    /// Runs work of microseconds on the pool.
+    pub(crate) fn spawn(&self, work: impl FnOnce() + Send + 'static) {
+        self.pool.spawn(work);
+    }
+
     /// Runs a job and waits for it. The job gets the workers and is to stop when the returned future is dropped.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         admission: Admission,
         job: impl FnOnce(Workers<'_>, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let (pool, faults) = (Arc::clone(&self.pool), self.faults.clone());
+        let pool = Arc::clone(&self.pool);
+        let (faults, queue) = (self.faults.clone(), Arc::clone(&self.queue));
         let _waiting = Waiting(Arc::clone(&admission.job));
         run_blocking(move || {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
@@ -152,7 +190,7 @@ impl SearchExecutor {
             let of_job = &*admission.job;
             let workers = Workers {
                 pool: &pool,
-                job: Some(of_job),
+                job: Some((of_job, &admission.queue_time)),
             };
             faults.at(FaultPoint::Coordinator);
             let is_over = || {
@@ -162,6 +200,7 @@ impl SearchExecutor {
                 of_job.is_cancelled()
             };
             let output = job(workers, Stop::when(&is_over));
+            queue.record(admission.queue_time.get());
             if !of_job.is_cancelled() {
                 of_job.done();
             }

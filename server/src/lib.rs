@@ -17,6 +17,9 @@
 //! `saved` keeps the files of objects and rigs that clients create in a folder or bucket; `objects` and `rigs` define their
 //! contents.
 //!
+//! `metrics` counts calls and searches, by the `methods` of the services, `traces` are their spans, and `monitor` answers operators
+//! and probes on a port of its own. `warning_rate` bounds warnings that clients can cause, and `log_lines` escapes what they send.
+//!
 //! Before serving, `memory` and `open_files` compare the configured limits with those of the process, and `objects::directory` loads
 //! the folder of objects. Between calls, `atlases` builds atlases in the background.
 //! `health_check` is a client: it asks a running server for its health. `faults` are those that tests inject.
@@ -26,8 +29,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  client  convention  error  faults  middleware  reload  wire
-//! limits  listen  tls  viewer
+//! budget  client  convention  error  faults  methods  middleware  reload  warning_rate  wire
+//! limits  listen  log_lines  metrics  tls  traces  viewer
 //! access  atlas_slots  executor  health_check  net  saved  web
 //! rigs
 //! answer  call  config  validate
@@ -35,6 +38,7 @@
 //! atlases
 //! search
 //! services
+//! monitor
 //! serve
 //! ```
 //!
@@ -58,8 +62,12 @@ mod faults;
 mod health_check;
 mod limits;
 mod listen;
+mod log_lines;
 mod memory;
+mod methods;
+mod metrics;
 mod middleware;
+mod monitor;
 mod net;
 mod objects;
 mod open_files;
@@ -70,9 +78,11 @@ mod search;
 mod serve;
 mod services;
 mod tls;
+mod traces;
 mod track;
 mod validate;
 mod viewer;
+mod warning_rate;
 mod web;
 mod wire;
 
@@ -84,6 +94,7 @@ pub use faults::FaultPoint;
 pub use health_check::check_health;
 pub use limits::{StoreLimits, StreamLimits};
 pub use listen::{ListenAddress, Listener};
+pub use log_lines::LogLines;
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use open_files::fit_open_files;

@@ -92,6 +92,11 @@ impl Places {
         })
     }
 
+    /// Number of all places.
+    pub(crate) fn maximum(&self) -> usize {
+        self.all.maximum()
+    }
+
     pub(crate) fn taken(&self) -> usize {
         self.all.taken()
     }

@@ -12,7 +12,7 @@ use std::{
 use clap::{CommandFactory as _, Parser};
 use futures_util::future::select_all;
 use grasp_server::{
-    Config, ConfigError, ListenAddress, Listener, Server, check_health,
+    Config, ConfigError, ListenAddress, Listener, LogLines, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
     fit_open_files, is_reserved_memory_limited, new_token, warn_of_memory,
 };
@@ -33,7 +33,7 @@ const RUNTIME_END: Duration = Duration::from_millis(500);
 /// The server refuses to start, prints the reason and exits with 1 if a value or an object of the objects directory is
 /// invalid. After SIGTERM, SIGINT or SIGQUIT it answers running calls and exits with 0. After SIGHUP it does the same if its
 /// standard input is a terminal, which sends the signal when it is closed; otherwise it reads certificates, tokens
-/// and the filter of the log again.
+/// and the filter of the log again. A second signal ends it at once, with 1.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
 struct Flags {
@@ -195,19 +195,26 @@ async fn serve(
     let has_terminal = io::stdin().is_terminal();
     let reloader = server.reloader();
     let shutdown = async move {
-        let mut end = select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv())));
-        loop {
-            tokio::select! {
-                _ = &mut end => break,
-                _ = hangup.recv() => {
-                    if has_terminal {
-                        break;
+        {
+            let mut end = select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv())));
+            loop {
+                tokio::select! {
+                    _ = &mut end => break,
+                    _ = hangup.recv() => {
+                        if has_terminal {
+                            break;
+                        }
+                        rereading.reread();
+                        reloader.reload();
                     }
-                    rereading.reread();
-                    reloader.reload();
                 }
             }
         }
+        tokio::spawn(async move {
+            select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
+            tracing::warn!("a second signal: ending at once");
+            std::process::exit(1);
+        });
     };
     for listener in &listeners {
         let address = listener.address()?;
@@ -220,6 +227,16 @@ async fn serve(
             tracing::info!("the viewer is at {scheme}://{address}/");
         }
     }
+    let server = match &config.metrics_listen {
+        Some(address) => {
+            let listener = Listener::bind(address).await;
+            let listener =
+                listener.map_err(|error| format!("cannot listen on {address} for metrics: {error}"))?;
+            tracing::info!(at = %listener.address()?, "metrics and probes");
+            server.monitored_on(listener)
+        }
+        None => server,
+    };
     server.serve(listeners, shutdown).await?;
     Ok(())
 }
@@ -247,7 +264,7 @@ impl Rereading<'_> {
             && let Ok(filter) = config.log.parse::<Targets>()
             && self.log_filter.reload(filter).is_ok()
         {
-            self.values.log = values.log.clone();
+            self.values.log.clone_from(&values.log);
             tracing::info!(log = config.log, "applied a change of the configuration");
         }
         for key in self.values.differences(&values) {
@@ -259,11 +276,12 @@ impl Rereading<'_> {
 fn start_log(config: &Config) -> Result<LogFilter, Box<dyn std::error::Error>> {
     let (filter, handle) = reload::Layer::new(config.log.parse::<Targets>()?);
     let filtered = tracing_subscriber::registry().with(filter);
+    let is_terminal = io::stderr().is_terminal();
     let log = fmt::layer()
-        .with_ansi(io::stderr().is_terminal())
+        .with_ansi(is_terminal)
         // Writing to a log that failed, such as a closed terminal, would panic.
         .log_internal_errors(false)
-        .with_writer(io::stderr);
+        .with_writer(move || LogLines::new(io::stderr(), is_terminal));
     match config.log_format {
         LogFormat::Text => filtered.with(log).init(),
         LogFormat::Json => filtered.with(log.json().flatten_event(true)).init(),

@@ -172,6 +172,7 @@ LINKED = [
     "client/bevy/README.md",
     "server/README.md",
     "server/HANDS.md",
+    "server/OPERATIONS.md",
     "docker/README.md",
     "tests/README.md",
     "tests/results/measured-once.md",

@@ -9,7 +9,11 @@ use grasp_proto::v1::{
 };
 use grasp_server::{Config, FaultPoint, Gauges, Reloader, ServeError, Server, config::StorePlace};
 use grasp_synthesis::base::pose::Pose;
-use tokio::{net::TcpListener, task::JoinHandle};
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _},
+    net::{TcpListener, TcpStream},
+    task::JoinHandle,
+};
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tonic::transport::{Channel, Endpoint};
 
@@ -21,6 +25,7 @@ const WORKERS: usize = 2;
 pub struct TestServer {
     address: SocketAddr,
     scheme: &'static str,
+    monitor: SocketAddr,
     gauges: Gauges,
     reloader: Reloader,
     stop: DropGuard,
@@ -63,19 +68,19 @@ impl TestServer {
             ..Config::default()
         };
         adapt(&mut config);
-        let listener = TcpListener::bind((address, 0))
-            .await
-            .expect("a free port of this machine");
-        let address = listener.local_addr().expect("a bound socket has an address");
         let scheme = if config.tls.is_some() { "https" } else { "http" };
+        let (listener, address) = listen(address).await;
+        let (monitor_listener, monitor) = listen(Ipv6Addr::LOCALHOST.into()).await;
         let server = Server::new(config).expect("the server starts");
         server.inject_faults(hook);
+        let server = server.monitored_on(monitor_listener.into());
         let (gauges, reloader) = (server.gauges(), server.reloader());
         let stop = CancellationToken::new();
         let serving = tokio::spawn(server.serve([listener.into()], stop.clone().cancelled_owned()));
         Self {
             address,
             scheme,
+            monitor,
             gauges,
             reloader,
             stop: stop.drop_guard(),
@@ -86,6 +91,13 @@ impl TestServer {
     /// The address it listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// The status and the text with which the port for operators answers to a path.
+    pub async fn monitor(&self, path: &str) -> (u16, String) {
+        monitor(self.monitor, path)
+            .await
+            .expect("the port for operators answers")
     }
 
     /// The address as a client's endpoint.
@@ -152,6 +164,7 @@ impl TestServer {
     pub fn begin_stop(self) -> StoppingServer {
         drop(self.stop);
         StoppingServer {
+            monitor: self.monitor,
             gauges: self.gauges,
             serving: self.serving,
         }
@@ -166,6 +179,7 @@ impl TestServer {
 /// A server that is shutting down.
 #[derive(Debug)]
 pub struct StoppingServer {
+    monitor: SocketAddr,
     gauges: Gauges,
     serving: JoinHandle<Result<(), ServeError>>,
 }
@@ -176,6 +190,11 @@ impl StoppingServer {
         &self.gauges
     }
 
+    /// As [`TestServer::monitor`]; `None` once the server has ended.
+    pub async fn monitor(&self, path: &str) -> Option<(u16, String)> {
+        monitor(self.monitor, path).await
+    }
+
     /// Waits for the end of the shutdown.
     pub async fn stopped(self) {
         self.serving
@@ -183,6 +202,25 @@ impl StoppingServer {
             .expect("the server does not panic")
             .expect("the server stops without an error");
     }
+}
+
+async fn listen(interface: IpAddr) -> (TcpListener, SocketAddr) {
+    let listener = TcpListener::bind((interface, 0)).await;
+    let listener = listener.expect("a free port of this machine");
+    let address = listener.local_addr().expect("a bound socket has an address");
+    (listener, address)
+}
+
+/// Gets a path over HTTP/1.1: the status and the text of the answer.
+async fn monitor(address: SocketAddr, path: &str) -> Option<(u16, String)> {
+    let mut stream = TcpStream::connect(address).await.ok()?;
+    let request = format!("GET {path} HTTP/1.1\r\nhost: test\r\n\r\n");
+    stream.write_all(request.as_bytes()).await.ok()?;
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).await.ok()?;
+    let (head, text) = answer.split_once("\r\n\r\n")?;
+    let status = head.split(' ').nth(1)?.parse().ok()?;
+    Some((status, text.to_owned()))
 }
 
 /// A pose of the core as a message.

@@ -122,7 +122,7 @@ pub(crate) struct ServerOptions {
         default_value = "http://[::1]:50051"
     )]
     server: String,
-    /// File with the token to send, for servers that demand one [default: the variable GRASP_TOKEN, which has the token itself].
+    /// File with the token to send, for servers that demand one [default: the variable `GRASP_TOKEN`, which has the token itself].
     #[arg(long, global = true, value_name = "FILE", env = "GRASP_TOKEN_FILE")]
     token_file: Option<PathBuf>,
     /// File with the certificate of the authority to trust, in PEM [default: those of the system].

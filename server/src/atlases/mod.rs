@@ -17,7 +17,7 @@ mod growing;
 #[cfg(test)]
 mod tests;
 
-use std::{sync::Arc, time::Instant};
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
@@ -148,6 +148,23 @@ impl Atlases {
             growth: growth_of(&slot).into(),
             ..wire_atlas(id, handedness, atlas, Some(&slot.learned))
         }
+    }
+
+    /// Number of atlases of objects in memory, by their growth.
+    pub(crate) fn growths(&self) -> Vec<(&'static str, usize)> {
+        let mut counts: BTreeMap<v1::AtlasGrowth, usize> = BTreeMap::new();
+        for object in self.0.objects.in_memory() {
+            for (_, slot) in object.atlas_slots.all() {
+                *counts.entry(growth_of(&slot)).or_default() += 1;
+            }
+        }
+        let growths = (1..).map_while(|number| v1::AtlasGrowth::try_from(number).ok());
+        let count = |growth| {
+            let name = v1::AtlasGrowth::as_str_name(&growth);
+            let name = name.strip_prefix("ATLAS_GROWTH_").unwrap_or(name);
+            (name, counts.get(&growth).copied().unwrap_or(0))
+        };
+        growths.map(count).collect()
     }
 
     /// A guard that stops the builders, too.

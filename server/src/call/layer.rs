@@ -8,11 +8,13 @@ use std::{
 
 use http::{Request, Response, header};
 use tokio::sync::{Semaphore, watch};
+use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, body::Body, server::NamedService};
 use tower::Service;
 
 use super::{
-    CallContext, OpenCall,
+    CallContext, LOGGED_PACKAGE, OpenCall,
+    ending::ended_by,
     packing::{accepts_gzip, packing},
     panics::contained,
     reads::{Reads, is_read},
@@ -20,13 +22,15 @@ use super::{
 };
 use crate::{
     access::Door,
-    budget::{DeadlineReserve, parse_grpc_timeout},
+    budget::DeadlineReserve,
     client::Client,
     error::{ServiceError, blame_client},
     executor::SearchExecutor,
     limits::{ClientPermits, MAX_FIND_REQUEST, Place, Places, locked},
+    metrics::Metrics,
     middleware::{Answer, Middleware, filtered},
     net::{Reader, arriving},
+    traces::Traces,
 };
 
 /// Methods that build objects or rigs from large messages. The number of such messages received at a time is bounded.
@@ -68,6 +72,8 @@ pub(crate) fn is_upload(path: &str) -> bool {
 pub(crate) struct Calls {
     /// Lets calls in.
     pub door: Arc<Door>,
+    pub metrics: Arc<Metrics>,
+    pub traces: Traces,
     /// Has a receiver per call in flight.
     pub in_flight: watch::Sender<()>,
     /// Admits searches.
@@ -90,6 +96,10 @@ pub(crate) struct Calls {
     pub largest_upload: usize,
     /// Longest time from a call's headers to those of its answer.
     pub longest_call: Duration,
+    /// Cancelled when the server begins to shut down.
+    pub shutdown: CancellationToken,
+    /// Cancelled when running calls have had their time to end.
+    pub drained: CancellationToken,
 }
 
 impl Calls {
@@ -124,21 +134,22 @@ impl Middleware<Body> for Calls {
         E: Send + 'static,
         F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
     {
-        let timeout = request
-            .headers()
-            .get("grpc-timeout")
-            .and_then(|header| header.to_str().ok())
-            .and_then(parse_grpc_timeout);
         let reader = request.extensions().get::<Arc<Reader>>().cloned();
         let client = reader
             .as_ref()
             .map_or(Client::Local, |reader| reader.client.clone());
-        let mut context = CallContext::arriving(timeout, client);
+        let mut context = CallContext::arriving(request.headers(), client, &self.metrics);
         let path = request.uri().path();
         let peer = reader.as_ref().and_then(|reader| reader.peer.get());
         let admitted = self.door.admit(path, request.headers(), peer);
         let admitted = admitted.map(|caller| context.identify(caller));
-        let mut call = OpenCall::new(path, context.clone(), &self.in_flight, &self.reserve);
+        let mut call = OpenCall::new(
+            path,
+            context.clone(),
+            &self.in_flight,
+            &self.reserve,
+            &self.traces,
+        );
         if let Err(error) = admitted {
             return Box::pin(std::future::ready(Ok(call.answer(refusal(error)))));
         }
@@ -162,6 +173,7 @@ impl Middleware<Body> for Calls {
             Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),
             None => (MAX_FIND_REQUEST, usize::MAX),
         };
+        let ends = (!path.starts_with(LOGGED_PACKAGE)).then(|| self.shutdown.clone());
         let packs = !AWAITED_STREAMS.contains(&path) && accepts_gzip(request.headers());
         let client = context.client.clone();
         request.extensions_mut().insert(context);
@@ -173,6 +185,7 @@ impl Middleware<Body> for Calls {
         }
         let answer = contained(next(request), self.executor.faults.clone());
         let (packers, reads) = (Arc::clone(&self.packers), Arc::clone(&self.reads));
+        let drained = self.drained.clone();
         let answer = async move {
             let turn = match admitted {
                 Some(entered) => Some(reads.turn(entered, &client).await),
@@ -191,16 +204,31 @@ impl Middleware<Body> for Calls {
             })
         };
         Box::pin(async move {
-            let answer = match end {
-                None => answer.await,
-                Some((at, error)) => tokio::time::timeout_at(at.into(), answer)
-                    .await
-                    .unwrap_or_else(|_| Ok(refusal(error))),
+            let due = async {
+                match end {
+                    None => std::future::pending().await,
+                    Some((at, error)) => {
+                        tokio::time::sleep_until(at.into()).await;
+                        error
+                    }
+                }
+            };
+            let answer = tokio::select! {
+                biased;
+                answer = answer => answer,
+                error = due => Ok(refusal(error)),
+                () = drained.cancelled() => Ok(refusal(ServiceError::ShuttingDown)),
             };
             drop(arriving);
             call.answered();
             match answer {
-                Ok(answer) => Ok(call.answer(blame_client(answer, largest))),
+                Ok(answer) => {
+                    let answer = blame_client(answer, largest);
+                    Ok(call.answer(match ends {
+                        Some(shutdown) => answer.map(|body| ended_by(body, shutdown)),
+                        None => answer,
+                    }))
+                }
                 Err(error) => {
                     call.fail(Code::Internal);
                     Err(error)

@@ -3,34 +3,43 @@
 //! uploads; no other call of the same service may send large messages. A call lasts until its answer's body has been handed to the
 //! transport, which for streams may be long after its headers.
 
+mod ending;
 mod layer;
 mod packing;
 mod panics;
 mod reads;
+mod request_id;
 mod upload;
 
 use std::{
+    borrow::Cow,
     sync::{Arc, Mutex, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
 
-use http::{HeaderMap, Response};
+use grasp_proto::v1;
+use http::{HeaderMap, HeaderValue, Response};
 use tokio::sync::watch;
 use tonic::{Code, body::Body};
 
+use self::request_id::request_id;
 pub(crate) use self::{
     layer::{BySize, Calls, is_upload},
     packing::Messages as FramedMessages,
+    request_id::REQUEST_ID,
     upload::UploadPermit,
 };
 use crate::{
     access::Caller,
-    budget::DeadlineReserve,
+    budget::{DeadlineReserve, parse_grpc_timeout},
     client::Client,
-    executor::Admission,
+    error::add_request_id,
+    executor::{Admission, QueueTime},
     limits::locked,
+    metrics::{Method, Metrics},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+    traces::{CallTrace, Interval, Traces},
 };
 
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.
@@ -39,11 +48,16 @@ const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
 /// Context of a call for its handler, which adds to the call's log line.
 #[derive(Clone, Debug)]
 pub(crate) struct CallContext {
+    /// The client's id of the request, or a new one.
+    request_id: HeaderValue,
     pub arrived: Instant,
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
     pub client: Client,
     pub caller: Caller,
+    metrics: Arc<Metrics>,
+    /// The header with the span of the caller.
+    traceparent: Option<HeaderValue>,
     record: Arc<CallRecord>,
 }
 
@@ -53,6 +67,10 @@ struct CallRecord {
     object: OnceLock<String>,
     reserve: OnceLock<Duration>,
     search: OnceLock<SearchSummary>,
+    /// When the object was prepared for searches, if it was not.
+    preparation: OnceLock<Interval>,
+    /// How long the search has waited for its turns.
+    queue_time: OnceLock<Arc<QueueTime>>,
     /// When the search has to end.
     due: OnceLock<Instant>,
     /// When it ended.
@@ -68,6 +86,8 @@ pub(crate) struct SearchSummary {
     pub outcome: &'static str,
     pub attempts: u64,
     pub time: Duration,
+    /// The check for which there is no grasp, or not the current one.
+    pub failed_check: Option<v1::Check>,
 }
 
 impl CallContext {
@@ -80,22 +100,30 @@ impl CallContext {
     /// The context of a part of the call that arrived at `arrived` and is answered like a call of its own.
     pub(crate) fn of_part(&self, arrived: Instant) -> Self {
         Self {
+            request_id: self.request_id.clone(),
             arrived,
             deadline: self.deadline,
             client: self.client.clone(),
             caller: self.caller.clone(),
+            metrics: Arc::clone(&self.metrics),
+            traceparent: None,
             record: Arc::default(),
         }
     }
 
-    fn arriving(timeout: Option<Duration>, client: Client) -> Self {
+    fn arriving(headers: &HeaderMap, client: Client, metrics: &Arc<Metrics>) -> Self {
         let arrived = Instant::now();
+        let timeout = headers.get("grpc-timeout");
+        let timeout = timeout.and_then(|timeout| parse_grpc_timeout(timeout.to_str().ok()?));
         Self {
+            request_id: request_id(headers),
             arrived,
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
             client,
             caller: Caller::default(),
+            metrics: Arc::clone(metrics),
+            traceparent: headers.get("traceparent").cloned(),
             record: Arc::default(),
         }
     }
@@ -106,6 +134,10 @@ impl CallContext {
             self.client = Client::Named(Arc::clone(name));
         }
         self.caller = caller;
+    }
+
+    pub(crate) fn request_id(&self) -> &str {
+        self.request_id.to_str().unwrap_or_default()
     }
 
     /// The right to search that the call came with. Parts of a call have none.
@@ -132,8 +164,25 @@ impl CallContext {
     }
 
     pub(crate) fn search_ended(&self, at: Instant, summary: SearchSummary) {
+        let SearchSummary {
+            outcome,
+            time,
+            failed_check,
+            ..
+        } = summary;
+        self.metrics.searched(time, outcome, failed_check);
         let _ = self.record.ended.set(at);
         let _ = self.record.search.set(summary);
+    }
+
+    /// Records the right with which the call's search begins.
+    pub(crate) fn search_begins(&self, admission: &Admission) {
+        let _ = self.record.queue_time.set(admission.queue_time());
+    }
+
+    /// Records that the object was prepared for searches since then.
+    pub(crate) fn prepared_since(&self, start: Instant) {
+        let _ = self.record.preparation.set((start, Instant::now()));
     }
 
     pub(crate) fn log_object(&self, id: &str) {
@@ -169,11 +218,13 @@ fn code_in(headers: &HeaderMap) -> Option<Code> {
 /// client does not read. A client drops the call at its deadline: the answer would have taken at least until then.
 #[derive(Debug)]
 struct OpenCall {
-    method: String,
+    method: Method,
+    path: Cow<'static, str>,
     context: CallContext,
     /// `None` is logged as cancelled.
     code: Option<Code>,
     reserve: Arc<DeadlineReserve>,
+    traces: Traces,
     transport: Transport,
     /// How long the transport has waited for parts of the answer since the end of the search.
     waited: Duration,
@@ -197,12 +248,20 @@ impl OpenCall {
         context: CallContext,
         in_flight: &watch::Sender<()>,
         reserve: &Arc<DeadlineReserve>,
+        traces: &Traces,
     ) -> Self {
+        let method = context.metrics.call_started(path);
+        let clipped = || path.chars().take(MAX_LOGGED_METHOD).collect();
         Self {
-            method: path.chars().take(MAX_LOGGED_METHOD).collect(),
+            method,
+            path: context
+                .metrics
+                .path(method)
+                .map_or_else(|| Cow::Owned(clipped()), Cow::Borrowed),
             context,
             code: None,
             reserve: Arc::clone(reserve),
+            traces: traces.clone(),
             transport: Transport::Waits,
             waited: Duration::ZERO,
             _in_flight: in_flight.subscribe(),
@@ -214,9 +273,55 @@ impl OpenCall {
     }
 
     /// The answer, with whose body the call ends.
-    fn answer(mut self, answer: Response<Body>) -> Response<Body> {
-        self.code = code_in(answer.headers()).or(self.code);
+    fn answer(mut self, mut answer: Response<Body>) -> Response<Body> {
+        self.read_status(answer.headers_mut());
+        answer
+            .headers_mut()
+            .insert(REQUEST_ID, self.context.request_id.clone());
         answer.map(|inner| filtered(inner, self))
+    }
+
+    /// Reads the status in headers or trailers, and adds the id of the request to an error.
+    fn read_status(&mut self, headers: &mut HeaderMap) {
+        let Some(code) = code_in(headers) else { return };
+        self.code = Some(code);
+        if code != Code::Ok
+            && let Some(reason) = add_request_id(headers, self.context.request_id())
+        {
+            self.context.metrics.refused(reason);
+        }
+    }
+
+    fn trace(&self, code: Code) {
+        let CallContext { arrived, record, .. } = &self.context;
+        let search = record.search.get();
+        let ended = record.ended.get().copied();
+        let began = ended
+            .zip(search)
+            .and_then(|(ended, search)| ended.checked_sub(search.time));
+        // All of it together, as if the search had waited for its first turn only.
+        let queue_time = record.queue_time.get().map(|queue_time| queue_time.get());
+        let parts = [
+            ("preparation", record.preparation.get().copied()),
+            (
+                "queue",
+                began.map(|began| (began, began + queue_time.unwrap_or_default())),
+            ),
+            ("search", began.zip(ended)),
+        ];
+        self.traces.record(&CallTrace {
+            method: self.path.trim_start_matches('/'),
+            request_id: self.context.request_id(),
+            traceparent: self.context.traceparent.as_ref(),
+            object: record.object.get().map(String::as_str),
+            outcome: search.map(|search| search.outcome),
+            code,
+            time: (*arrived, Instant::now()),
+            parts: parts
+                .into_iter()
+                .filter_map(|(name, time)| Some((name, time?)))
+                .collect(),
+        });
     }
 
     /// The transport requests the next part of the answer.
@@ -248,16 +353,30 @@ impl Drop for OpenCall {
         self.answered();
         let record = &self.context.record;
         let search = record.search.get();
-        let status = grpc_name(self.code.unwrap_or(Code::Cancelled));
-        let total_us = micros(self.context.arrived.elapsed());
+        let code = self.code.unwrap_or(Code::Cancelled);
+        let total = self.context.arrived.elapsed();
+        let metrics = &self.context.metrics;
+        metrics.call_ended(self.method, code, total);
+        let late = self.context.deadline.map(|deadline| deadline.elapsed());
+        // A client that gave up earlier says nothing about answers.
+        if let Some(late) = late.filter(|late| self.code.is_some() || !late.is_zero()) {
+            metrics.overshot(late);
+        }
+        if self.traces.are_on() {
+            self.trace(code);
+        }
+        let (status, total_us) = (grpc_name(code), micros(total));
         macro_rules! log {
             ($level:ident) => {
                 tracing::$level!(
-                    method = %self.method,
+                    method = %self.path,
+                    client = %self.context.client,
+                    request_id = self.context.request_id(),
                     object = record.object.get(),
                     outcome = search.map(|s| s.outcome),
                     attempts = search.map(|s| s.attempts),
                     search_us = search.map(|s| micros(s.time)),
+                    queue_us = record.queue_time.get().map(|queue_time| micros(queue_time.get())),
                     reserve_us = record.reserve.get().copied().map(micros),
                     total_us,
                     %status,
@@ -265,7 +384,7 @@ impl Drop for OpenCall {
                 )
             };
         }
-        if self.method.starts_with(LOGGED_PACKAGE) {
+        if self.path.starts_with(LOGGED_PACKAGE) {
             log!(info);
         } else {
             log!(debug);
@@ -293,14 +412,14 @@ fn grpc_name(code: Code) -> String {
 impl FrameFilter for OpenCall {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         self.asked();
-        let polled = next_frame(inner, cx);
+        let mut polled = next_frame(inner, cx);
         if polled.is_ready() {
             self.answered();
         }
-        if let Poll::Ready(Some(Ok(frame))) = &polled
-            && let Some(code) = frame.trailers_ref().and_then(code_in)
+        if let Poll::Ready(Some(Ok(frame))) = &mut polled
+            && let Some(trailers) = frame.trailers_mut()
         {
-            self.code = Some(code);
+            self.read_status(trailers);
         }
         polled
     }

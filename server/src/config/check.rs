@@ -48,6 +48,23 @@ impl Check {
         *value = Duration::from_millis(milliseconds as u64);
     }
 
+    /// A text that may be absent.
+    pub(super) fn optional<T>(
+        &mut self,
+        key: &str,
+        raw: &mut Option<String>,
+        value: &mut Option<T>,
+        needed: &str,
+        parse: impl Fn(&str) -> Option<T>,
+    ) {
+        if let Some(text) = raw {
+            *value = parse(text);
+            if value.is_none() {
+                self.reject(key, format_args!("{text:?}"), needed);
+            }
+        }
+    }
+
     /// A path that is not empty. The folder itself is opened later.
     pub(super) fn folder(&mut self, key: &str, raw: &mut Option<PathBuf>, value: &mut Option<PathBuf>) {
         self.path(key, "a folder", raw, value);

@@ -98,6 +98,12 @@ pub struct Config {
     pub web_origins: WebOrigins,
     /// Serve the page that shows grasps in a browser at `/`.
     pub viewer: bool,
+    /// Address for metrics and probes. `None` for nowhere. The binary listens there; see [`crate::Server::monitored_on`].
+    pub metrics_listen: Option<ListenAddress>,
+    /// Address of a collector of OpenTelemetry for traces, `http://HOST:PORT`. `None` for no traces.
+    pub otlp_endpoint: Option<String>,
+    /// How long new calls are answered after the signal to end, for balancers to notice.
+    pub drain_delay: Duration,
     /// How long to wait for running calls at shutdown.
     pub drain: Duration,
     /// Rig of the receiving hand if a request names none. Under `THESIS` validity it is always the rig `thesis`.
@@ -155,6 +161,9 @@ impl Default for Config {
             maximum_unread_bytes: non_zero(32 << 20),
             web_origins: WebOrigins::LOOPBACK,
             viewer: false,
+            metrics_listen: None,
+            otlp_endpoint: None,
+            drain_delay: Duration::ZERO,
             drain: Duration::from_secs(10),
             default_rig: "adult".to_owned(),
             log_format: LogFormat::Text,

@@ -16,7 +16,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::{Config, ConfigError, LogFormat, StorePlace, check::Check};
 use crate::{
     limits::MAX_RESPONSE,
+    listen::{ListenAddress, NEEDED_LISTEN},
     saved::NEEDED_PLACE,
+    traces::{NEEDED_ENDPOINT, parse_endpoint},
     web::{NEEDED_ORIGINS, parse_origins},
 };
 
@@ -173,6 +175,20 @@ pub struct RawConfig {
     /// Serve a page at `/` that shows objects, hands and grasps in a browser [default: false].
     #[arg(long, env = "GRASP_VIEWER", value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub viewer: Option<bool>,
+    /// Address for metrics (`/metrics`) and probes (`/livez`, `/readyz`), such as `127.0.0.1:9464` or `unix:/PATH` [default: none].
+    #[arg(long, env = "GRASP_METRICS_LISTEN", value_name = "ADDRESS")]
+    pub metrics_listen: Option<String>,
+    /// Where to send traces of calls: a collector of OpenTelemetry that takes OTLP over gRPC, such as `http://localhost:4317` [default:
+    /// none].
+    ///
+    /// Needs a server built with the feature otlp, as the one in the container image is.
+    #[arg(long, env = "GRASP_OTLP_ENDPOINT", value_name = "ADDRESS")]
+    pub otlp_endpoint: Option<String>,
+    /// How long new calls are answered after a signal to end, in milliseconds, while health is already `NOT_SERVING` [default: 0].
+    ///
+    /// Give it the time that load balancers take to notice.
+    #[arg(long, env = "GRASP_DRAIN_DELAY_MS", value_name = "MS")]
+    pub drain_delay_ms: Option<u64>,
     /// How long to wait for running calls at shutdown, in milliseconds [default: 10000].
     #[arg(long, env = "GRASP_DRAIN_MS", value_name = "MS")]
     pub drain_ms: Option<u64>,
@@ -301,6 +317,10 @@ impl RawConfig {
         read!(text(web_origins => config.web_origins, NEEDED_ORIGINS, parse_origins));
         config.viewer = self.viewer.or(fallback.viewer).unwrap_or(config.viewer);
         self.viewer = Some(config.viewer);
+        let address = |text: &str| text.trim().parse::<ListenAddress>().ok();
+        read!(optional(metrics_listen => config.metrics_listen, NEEDED_LISTEN, address));
+        read!(optional(otlp_endpoint => config.otlp_endpoint, NEEDED_ENDPOINT, parse_endpoint));
+        read!(time(drain_delay_ms => config.drain_delay, 0..=600_000));
         read!(time(drain_ms => config.drain, 0..=600_000));
         let rig = |name: &str| RIG_NAMES.contains(&name).then(|| name.to_owned());
         read!(text(default_rig => config.default_rig, &RIG_NAMES.join(" or "), rig));
@@ -371,8 +391,8 @@ mod tests {
 
     #[test]
     fn reports_every_invalid_value_with_its_key() {
-        // Five numbers may be 0.
-        for (number, expected) in [(0, 33), (i64::MAX, 38)] {
+        // Six numbers may be 0.
+        for (number, expected) in [(0, 35), (i64::MAX, 41)] {
             let mut raw = RawConfig::default();
             raw.complete(RawConfig::default()).unwrap();
             let mut keys = toml::Table::try_from(&raw).unwrap();
@@ -391,6 +411,8 @@ mod tests {
                     .into_iter()
                     .chain(["tls_certificate", "tls_key", "tls_client_ca", "tokens_file"]);
             keys.extend(paths.map(|key| (key.to_owned(), "".into())));
+            keys.insert("metrics_listen".to_owned(), "9464".into());
+            keys.insert("otlp_endpoint".to_owned(), "localhost:4317".into());
             let mut raw: RawConfig = keys.try_into().unwrap();
             let Err(ConfigError::BadValues(bad)) = raw.complete(RawConfig::default()) else {
                 panic!("most of it is wrong");

@@ -19,6 +19,7 @@ use super::{
     messages::{PACKED, PREFIX},
 };
 use crate::{
+    call::REQUEST_ID,
     error::CHALLENGE,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
 };
@@ -40,7 +41,15 @@ const OF_PROTOCOL: [&str; 7] = [
 ];
 
 /// The answer of the services as one of Connect.
-pub(super) async fn answered(answer: Response<Body>, format: Format) -> Response<Body> {
+pub(super) async fn answered(mut answer: Response<Body>, format: Format) -> Response<Body> {
+    // A header, even where the others are trailers.
+    let id = answer.headers_mut().remove(REQUEST_ID);
+    let mut answer = reframed(answer, format).await;
+    answer.headers_mut().extend(id.map(|id| (REQUEST_ID, id)));
+    answer
+}
+
+async fn reframed(answer: Response<Body>, format: Format) -> Response<Body> {
     if let Some(status) = Status::from_header_map(answer.headers()) {
         return failure(&status, format);
     }

@@ -9,7 +9,7 @@ use serde_json::Value;
 use tonic::{Code, Status};
 use tonic_types::pb;
 
-use super::methods::message;
+use crate::methods::message;
 
 /// The status of HTTP and the name of a code.
 pub(super) fn http_status(code: Code) -> (StatusCode, &'static str) {

@@ -385,10 +385,8 @@ fn written(call: &Call, messages: Bytes) -> Result<Bytes, ServiceError> {
 mod tests {
     use http_body_util::{BodyExt as _, StreamBody};
 
-    use super::{
-        super::{Format, methods::method},
-        *,
-    };
+    use super::{super::Format, *};
+    use crate::methods::method;
 
     #[test]
     fn values_are_counted_outside_texts() {

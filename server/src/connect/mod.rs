@@ -9,18 +9,13 @@
 mod answers;
 mod errors;
 mod messages;
-mod methods;
 mod requests;
 
 use http::{Request, Response, Version};
 use tonic::body::Body;
 
 pub(crate) use self::messages::Transcoding;
-use self::{
-    answers::answered,
-    methods::{Method, method},
-    requests::call,
-};
+use self::{answers::answered, requests::call};
 use crate::middleware::{Answer, Middleware};
 
 /// How the messages of a call are written and framed.

@@ -4,12 +4,14 @@ use http::{HeaderMap, HeaderName, HeaderValue, Response, StatusCode, Version, he
 use tonic::{Status, body::Body};
 
 use super::{
-    Format, Method,
+    Format,
     answers::{failure, refusal},
-    method,
-    methods::named_like,
 };
-use crate::{error::ServiceError, wire::quoted};
+use crate::{
+    error::ServiceError,
+    methods::{Method, method, named_like},
+    wire::quoted,
+};
 
 const VERSION: &str = "connect-protocol-version";
 const TIMEOUT: &str = "connect-timeout-ms";

@@ -1,5 +1,6 @@
 //! Errors of calls.
 
+mod request_info;
 mod status;
 
 use std::time::Duration;
@@ -7,6 +8,7 @@ use std::time::Duration;
 use grasp_proto::v1::ErrorReason;
 use grasp_synthesis::base::stop::Stopped;
 
+pub(crate) use request_info::add_request_id;
 pub(crate) use status::{CHALLENGE, blame_client};
 use status::{MAX_SUMMARY, clipped_message};
 

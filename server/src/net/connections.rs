@@ -14,9 +14,9 @@ use grasp_admission::may_hold_another;
 
 use super::{
     frames::{FrameBudget, PER_CONNECTION},
-    reader::{Phase, Reader},
+    reader::{Closing, Phase, Reader},
 };
-use crate::{client::Client, limits::locked};
+use crate::{client::Client, limits::locked, metrics::Counters, warning_rate::WarningRate};
 
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
 const MAX_STALL: Duration = Duration::from_secs(20);
@@ -37,6 +37,9 @@ pub(crate) struct Connections {
     /// The zero of all times.
     start: Instant,
     open: Mutex<Open>,
+    /// Connections that the server closed.
+    pub(crate) closings: Counters,
+    pub(super) warnings: WarningRate,
 }
 
 #[derive(Debug, Default)]
@@ -103,7 +106,7 @@ impl Open {
             return false;
         };
         if let Some(reader) = self.remove(number) {
-            reader.close("another connection needs its place");
+            reader.close(Closing::Displaced);
         }
         true
     }
@@ -117,6 +120,8 @@ impl Connections {
             unread: AtomicUsize::new(0),
             start: Instant::now(),
             open: Mutex::default(),
+            closings: Counters::new("reason", Closing::NAMES),
+            warnings: WarningRate::default(),
         })
     }
 
@@ -178,7 +183,7 @@ impl Connections {
     fn close_stalled_since(&self, longest: Duration) {
         for reader in self.readers() {
             if reader.stalled() > longest {
-                reader.close("its client has read nothing for too long");
+                reader.close(Closing::Stalled);
             }
         }
     }
@@ -196,8 +201,7 @@ impl Connections {
             && let Some((held, largest)) = open.pop()
         {
             sum -= held.bytes;
-            largest
-                .close("it holds the most of too many bytes: its client does not read, or end its requests");
+            largest.close(Closing::TooManyBytes);
         }
     }
 

@@ -40,6 +40,31 @@ const MAX_CALLS: usize = 64;
 /// When a client with too many calls should try again: after about the time of a few searches.
 const RETRY_WHEN_ANSWERED: Duration = Duration::from_millis(50);
 
+/// Why a connection is closed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Closing {
+    Displaced,
+    Stalled,
+    TooManyBytes,
+    Frames,
+}
+
+impl Closing {
+    /// The names of all in metrics.
+    pub(super) const NAMES: [&str; 4] = ["displaced", "stalled", "too_many_bytes", "frames"];
+
+    fn text(self) -> &'static str {
+        match self {
+            Self::Displaced => "another connection needs its place",
+            Self::Stalled => "its client has read nothing for too long",
+            Self::TooManyBytes => {
+                "it holds the most of too many bytes: its client does not read, or end its requests"
+            }
+            Self::Frames => "its client sends frames that lead to nothing",
+        }
+    }
+}
+
 /// A connection's client, and what waits on it. Times are in milliseconds since the start of [`Connections`].
 #[derive(Debug)]
 pub(crate) struct Reader {
@@ -243,19 +268,23 @@ impl Reader {
     pub(super) fn spend_frames(&self, frames: u64) -> bool {
         let within = self.frames.spend(frames);
         if !within {
-            self.close("its client sends frames that lead to nothing");
+            self.close(Closing::Frames);
         }
         within
     }
 
     /// Closes the connection at once.
-    pub(super) fn close(&self, reason: &str) {
-        tracing::warn!(
-            client = %self.client,
-            unread_bytes = self.unread(),
-            reason,
-            "closing a connection"
-        );
+    pub(super) fn close(&self, reason: Closing) {
+        self.all.closings.add(reason as usize);
+        if let Some(unlogged) = self.all.warnings.pass() {
+            tracing::warn!(
+                client = %self.client,
+                unread_bytes = self.unread(),
+                reason = reason.text(),
+                unlogged,
+                "closing a connection"
+            );
+        }
         self.cut_off.cancel();
     }
 

@@ -10,7 +10,7 @@ use std::{
 use bytes::Bytes;
 use grasp_admission::may_hold_another;
 use grasp_assets::hands::{self, RIG_NAMES};
-use grasp_proto::v1;
+use grasp_proto::{has_too_many_parts, v1};
 use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 use object_store::Error;
 use prost::Message;
@@ -21,7 +21,7 @@ use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
     saved::{
-        FieldMove, RIGS, Records, SavedFiles, Unreadable, are_few, field, message, move_fields, seal,
+        FieldMove, RIGS, Records, SavedFiles, Unreadable, field, is_decodable, message, move_fields, seal,
         wait_for,
     },
 };
@@ -100,6 +100,11 @@ impl RigStore {
     /// derive from them.
     pub(crate) fn scaled(&self, hand: &RigHand, hundredths: u16) -> RigHand {
         self.scaled.get(hand, hundredths)
+    }
+
+    /// Number of created rigs, with damaged ones.
+    pub(crate) fn count(&self) -> usize {
+        self.created().len()
     }
 
     /// Checks that a rig can be added: called before a rig is made, so that none is made in vain.
@@ -280,9 +285,8 @@ struct SavedRig {
     owner: String,
 }
 
-/// The request in a record, and its lists: hands with joints, the map of joints, and limits.
+/// The number of the request in a record.
 const NOW: usize = 10;
-const LISTS: [&[usize]; 4] = [&[3], &[3, 2], &[4], &[5]];
 
 /// The places of a version 0.1 record's fields in a request.
 const REQUEST: &[FieldMove] = &[
@@ -307,13 +311,14 @@ const LIMITS: &[FieldMove] = &[
 ];
 
 fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
-    if !are_few(record, &[NOW], &LISTS) {
+    if !is_decodable::<v1::CreateRigRequest>(record, NOW) {
         return None;
     }
     if let Some(request) = SavedRig::decode(record).ok()?.request {
         return Some(request);
     }
-    let request = move_fields(record, REQUEST).filter(|request| are_few(request, &[], &LISTS))?;
+    let request = move_fields(record, REQUEST)
+        .filter(|request| !has_too_many_parts::<v1::CreateRigRequest>(request))?;
     let mut request = v1::CreateRigRequest::decode(&*request).ok()?;
     for (place, limits) in (1..).zip(&mut request.limits) {
         if limits.digit == 0 {

@@ -29,7 +29,7 @@ use object_store::{
 
 use self::lease::Lease;
 pub(crate) use self::records::{
-    FieldMove, NotCreated, Records, Unreadable, are_few, field, message, move_fields, seal,
+    FieldMove, NotCreated, Records, Unreadable, field, is_decodable, message, move_fields, seal,
 };
 use crate::error::ServiceError;
 

@@ -7,8 +7,9 @@ use std::{
 };
 
 use bytes::Bytes;
+use grasp_proto::has_too_many_parts;
 use object_store::{Error, path::Path};
-use prost::{Message, decode_length_delimiter, encode_length_delimiter};
+use prost::{Message, Name, decode_length_delimiter, encode_length_delimiter};
 use sha2::{Digest as _, Sha256};
 
 use super::{SavedFiles, StoreError, log_failure};
@@ -264,23 +265,13 @@ fn take_field<'m>(message: &mut &'m [u8]) -> Option<WrittenField<'m>> {
     })
 }
 
-/// Most messages of a list in a record, more than any request has.
-const MAX_LISTED: usize = 32_768;
-
-/// True if the messages in these lists, paths of field numbers below `of`, are few enough to be decoded: empty ones take a hundred times
-/// their bytes.
-pub(crate) fn are_few(message: &[u8], of: &[usize], lists: &[&[usize]]) -> bool {
-    let mut paths = lists.iter().map(|list| [of, list].concat());
-    paths.all(|path| count(message, &path) <= MAX_LISTED)
-}
-
-fn count(message: &[u8], path: &[usize]) -> usize {
-    match path {
-        [] => 1,
-        [number, rest @ ..] => contents(message, *number)
-            .map(|content| count(content, rest))
-            .sum(),
-    }
+/// True if a record has one message of this type at most, in the field `number`, which is small enough in memory to be decoded.
+pub(crate) fn is_decodable<M: Name>(record: &[u8], number: usize) -> bool {
+    let mut contents = contents(record, number);
+    let is_small = contents
+        .next()
+        .is_none_or(|content| !has_too_many_parts::<M>(content));
+    is_small && contents.next().is_none()
 }
 
 /// The contents of a message's fields of this number, up to the first that is not one.

@@ -248,6 +248,7 @@ impl PreparedJob {
                 outcome: response.outcome().as_str_name(),
                 attempts: response.attempts(),
                 time: response.search_time(),
+                failed_check: failed_check(&response),
             },
             new_grip,
             response,
@@ -381,6 +382,19 @@ impl PreparedJob {
             limit.into_iter().collect()
         }))
     }
+}
+
+/// The check that the current grasp fails or, without a grasp, that the holdout or the nearest miss fails.
+fn failed_check(response: &v1::FindGraspResponse) -> Option<v1::Check> {
+    let of_current = response
+        .current
+        .iter()
+        .filter_map(|current| current.failed_check.as_ref());
+    let report = response.report.as_ref().filter(|_| response.grasps.is_empty());
+    let of_limits = report.into_iter().flat_map(|report| &report.limits);
+    let of_miss = report.and_then(|report| report.nearest_miss.as_ref()?.verdict.as_ref());
+    let first = of_current.chain(of_limits).chain(of_miss).next();
+    first.map(v1::Verdict::check)
 }
 
 /// How a known grip of one hand ranks against one of the other: preferred ones first, those of atlases before learned ones.

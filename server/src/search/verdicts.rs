@@ -48,7 +48,6 @@ pub(crate) fn judge(
     let task = prepared.task(0);
     let pose = grasp.at_object(task.rig, frame.client_from_object);
     let mut judgement = verdicts::judge(task, &settings.query, &pose, stop)?;
-    let check_time = start.elapsed();
     let nearest = if find_nearest && !judgement.is_valid() {
         let is_over = || prepared.now() >= prepared.budget;
         // A search is due if nothing known is valid.
@@ -79,6 +78,10 @@ pub(crate) fn judge(
         }
     };
     let valid = judgement.is_valid();
+    let failed = verdicts
+        .iter()
+        .find(|verdict| !verdict.passed)
+        .map(v1::Verdict::check);
     Ok(Answered {
         response: v1::ValidateGraspResponse {
             valid,
@@ -93,7 +96,8 @@ pub(crate) fn judge(
         summary: SearchSummary {
             outcome: if valid { "VALID" } else { "NOT_VALID" },
             attempts: 0,
-            time: check_time,
+            time: ended - start,
+            failed_check: failed,
         },
         new_grip: None,
     })
@@ -154,6 +158,7 @@ pub(crate) fn rate(
             },
             attempts,
             time: ended - start,
+            failed_check: None,
         },
         response,
         new_grip: None,

@@ -78,6 +78,7 @@ impl Handler {
             let due = call.latest_end(self.config.budgets.maximum);
             self.executor.admit(&call.client, due)?.within(own)
         };
+        call.search_begins(&admission);
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;
         let held = stored.hold();

@@ -13,6 +13,7 @@ use std::{
         Arc,
         atomic::{AtomicU64, Ordering},
     },
+    time::Instant,
 };
 
 use tokio::sync::{Semaphore, watch};
@@ -31,6 +32,7 @@ use crate::{
     error::ServiceError,
     executor::{SearchExecutor, before, run_blocking, run_stoppable},
     limits::{ClientPermits, Places},
+    metrics::Metrics,
     net::Connections,
     objects::{
         Derived, Revision, StoredObject,
@@ -53,6 +55,7 @@ pub(crate) struct Shared {
     pub rigs: Arc<RigStore>,
     pub atlases: Atlases,
     pub executor: SearchExecutor,
+    pub metrics: Arc<Metrics>,
     pub resizer: Resizer,
     /// The part of deadlines kept for answers.
     pub reserve: Arc<DeadlineReserve>,
@@ -129,6 +132,7 @@ impl Shared {
         let turn = before(due, self.heavy.acquire(&call.client)).await?;
         let permit = before(due, Arc::clone(&self.deriving).acquire_owned()).await?;
         let permit = permit.map_err(|_| ServiceError::ShuttingDown)?;
+        let start = Instant::now();
         let (objects, object, rig) = (Arc::clone(&self.objects), Arc::clone(object), rig.clone());
         let derived = run_stoppable(due, move |stop| {
             let _permits = (turn, permit);
@@ -136,7 +140,9 @@ impl Shared {
             derived.prepare(&rig, stop)?;
             Ok::<_, ServiceError>(derived)
         });
-        derived.await?
+        let derived = derived.await?;
+        call.prepared_since(start);
+        derived
     }
 }
 

@@ -224,7 +224,7 @@ impl Track {
     /// Answers pushed frames, until none comes for too long, an answer panics, or the server shuts down.
     async fn answer_pushed(mut self) {
         while let Ok(Some(PendingFrame { latest, call, reply })) = self.latest().await {
-            let answer = contained(self.answer(latest, &call)).await;
+            let answer = Box::pin(contained(self.answer(latest, &call))).await;
             let is_broken = matches!(answer, Err(ServiceError::Panicked));
             if reply.is_some_and(|reply| reply.send(answer).is_err()) {
                 // Nobody received it.

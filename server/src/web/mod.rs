@@ -27,7 +27,7 @@ pub(crate) use origins::{NEEDED_ORIGINS, parse_origins};
 const REMEMBERED: Duration = Duration::from_hours(2);
 
 /// Headers of requests that pages may set: tokens, and those of the clients of gRPC-Web and Connect.
-const REQUEST_HEADERS: [HeaderName; 10] = [
+const REQUEST_HEADERS: [HeaderName; 12] = [
     header::AUTHORIZATION,
     HeaderName::from_static("connect-accept-encoding"),
     HeaderName::from_static("connect-content-encoding"),
@@ -36,18 +36,21 @@ const REQUEST_HEADERS: [HeaderName; 10] = [
     header::CONTENT_ENCODING,
     header::CONTENT_TYPE,
     HeaderName::from_static("grpc-timeout"),
+    HeaderName::from_static("traceparent"),
     HeaderName::from_static("x-grpc-web"),
+    HeaderName::from_static("x-request-id"),
     HeaderName::from_static("x-user-agent"),
 ];
 
 /// Headers of answers that pages may read: the status of an answer without messages, and how messages are packed.
-const ANSWER_HEADERS: [HeaderName; 6] = [
+const ANSWER_HEADERS: [HeaderName; 7] = [
     HeaderName::from_static("connect-content-encoding"),
     header::CONTENT_ENCODING,
     HeaderName::from_static("grpc-message"),
     HeaderName::from_static("grpc-status"),
     HeaderName::from_static("grpc-status-details-bin"),
     HeaderName::from_static("trailer-grpc-retry-pushback-ms"),
+    HeaderName::from_static("x-request-id"),
 ];
 
 const GRPC: [&str; 2] = ["application/grpc", "application/grpc+proto"];

@@ -282,7 +282,7 @@ fn a_process_without_files_serves_open_connections_idles_and_recovers() {
         .collect();
     let before = server.processor_time();
     thread::sleep(WITHOUT_FILES);
-    let used = server.processor_time() - before;
+    let used = server.processor_time().saturating_sub(before);
     answered(ask);
     println!(
         "{used:?} of processor time in {WITHOUT_FILES:?} without files, with {} waiting",

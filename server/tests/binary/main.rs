@@ -5,6 +5,7 @@ mod bombs;
 mod forged;
 mod growth;
 mod kills;
+mod log;
 mod stress;
 
 use std::{
@@ -38,23 +39,6 @@ fn output(line: &str, variables: &[(&str, &str)]) -> (i32, String) {
     (code, text)
 }
 
-/// A folder for files of a test, removed with it.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(test: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("grasp-binary-{test}-{}", std::process::id()));
-        fs::create_dir_all(&path).expect("it can be created");
-        Self(path)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
 /// A running server, killed when it is dropped.
 struct Running {
     child: Child,
@@ -82,7 +66,11 @@ impl Running {
                 read > 0,
                 "the server ended before it logged its address: {start_log}"
             );
-            if let Some((_, rest)) = start_log[start..].split_once("address=") {
+            // In JSON or as text.
+            let line = start_log[start..]
+                .replace("\"address\":\"", "address=")
+                .replace('"', " ");
+            if let Some((_, rest)) = line.split_once("address=") {
                 break rest.split_whitespace().next().expect("it follows").to_owned();
             }
         };
@@ -133,10 +121,16 @@ impl Drop for Running {
     }
 }
 
-/// A test's own folder, absent at first and removed at the end.
+/// A test's own folder, removed at the end.
 struct Folder(PathBuf);
 
 impl Folder {
+    fn new(test: &str) -> Self {
+        let folder = Self::absent(test);
+        fs::create_dir_all(&folder.0).expect("it can be created");
+        folder
+    }
+
     fn absent(test: &str) -> Self {
         Self(std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id())))
     }
@@ -296,6 +290,20 @@ fn every_signal_to_end_drains_even_when_nobody_reads_the_log() {
     // As with a closed terminal.
     server.log = None;
     server.end_by("QUIT");
+}
+
+#[test]
+fn a_second_signal_ends_the_server_at_once() {
+    let variables = [
+        ("GRASP_LISTEN", "127.0.0.1:0"),
+        ("GRASP_DRAIN_DELAY_MS", "600000"),
+    ];
+    let mut server = Running::start(&variables);
+    server.signal("TERM");
+    server.read_until("draining");
+    server.signal("INT");
+    let status = server.child.wait().expect("it is a child");
+    assert_eq!(status.code(), Some(1));
 }
 
 #[test]

@@ -122,10 +122,8 @@ impl Tally {
             quantile(&lags, 0.99),
         );
         if let Some(first) = self.calls.iter().find_map(|call| call.failure.as_ref()) {
-            text += &format!(
-                "; {} failed, the first with {first}",
-                self.count(|end| end == End::Failed)
-            );
+            let failed = self.count(|end| end == End::Failed);
+            text = format!("{text}; {failed} failed, the first with {first}");
         }
         text
     }

@@ -13,7 +13,7 @@ use std::{
 use crate::cores::Cores;
 
 /// Longest wait for a server to start.
-const STARTS_WITHIN: Duration = Duration::from_secs(60);
+const STARTS_WITHIN: Duration = Duration::from_mins(1);
 
 /// Start of the names of threads that search.
 const SEARCH_THREADS: &str = "grasp-search";

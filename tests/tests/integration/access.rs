@@ -143,7 +143,7 @@ async fn each_method_needs_its_scope_and_is_refused_before_its_message_is_read()
             let is_let_in = needed.is_none() || scope == needed;
             if is_let_in {
                 // Ends the request without a message.
-                request.send_data(Default::default(), true).unwrap();
+                request.send_data(bytes::Bytes::new(), true).unwrap();
             }
             let status = answer_to(answer).await.status_in_headers();
             if is_let_in {

@@ -17,11 +17,21 @@ const SERVER: &[&[&str]] = &[
         "convention",
         "error",
         "faults",
+        "methods",
         "middleware",
         "reload",
+        "warning_rate",
         "wire",
     ],
-    &["limits", "listen", "tls", "viewer"],
+    &[
+        "limits",
+        "listen",
+        "log_lines",
+        "metrics",
+        "tls",
+        "traces",
+        "viewer",
+    ],
     &[
         "access",
         "atlas_slots",
@@ -37,6 +47,7 @@ const SERVER: &[&[&str]] = &[
     &["atlases"],
     &["search"],
     &["services"],
+    &["monitor"],
     &["serve"],
 ];
 

@@ -1,20 +1,16 @@
-//! Standard services and life cycle: health, reflection, a start when it is ready, and a shutdown.
+//! Standard services: health and reflection, and a start when the server is ready.
 
-use std::{env, process::Command, time::Duration};
+use std::{env, process::Command};
 
 use grasp_assets::hands::{RIG_NAMES, hand};
-use grasp_proto::v1;
 use grasp_synthesis::{model::hand::Handedness, propose::prepared::PreparedRig};
 use grasp_tests::TestServer;
 use prost::Message as _;
-use tokio::{io::AsyncReadExt as _, net::TcpStream};
 use tokio_stream::once;
 use tonic::Code;
 use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
-
-use crate::fixtures::{bounded, impossible, until};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_server_and_each_service_report_serving() {
@@ -36,25 +32,6 @@ async fn the_server_and_each_service_report_serving() {
         service: "grasp.v1.Nothing".to_owned(),
     };
     assert_eq!(client.check(request).await.unwrap_err().code(), Code::NotFound);
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_watcher_sees_the_shutdown_and_does_not_delay_it() {
-    let server = TestServer::start().await;
-    let mut client = HealthClient::new(server.channel().await);
-    let request = HealthCheckRequest {
-        service: "grasp.v1.GraspService".to_owned(),
-    };
-    let mut statuses = client.watch(request).await.unwrap().into_inner();
-    let first = statuses.message().await.unwrap().unwrap();
-    assert_eq!(first.status(), ServingStatus::Serving);
-    let stopping = server.begin_stop();
-    let second = bounded("the second status", statuses.message())
-        .await
-        .unwrap()
-        .unwrap();
-    assert_eq!(second.status(), ServingStatus::NotServing);
-    bounded("the end", stopping.stopped()).await;
 }
 
 /// Services that must be listed.
@@ -145,60 +122,4 @@ async fn hands_are_prepared_before_the_server_serves() {
     for rig in rigs() {
         assert!(rig.is_derived());
     }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn idle_connections_do_not_delay_shutdown() {
-    let server = TestServer::start_with(|config| config.drain = Duration::from_hours(1)).await;
-    let mut silent = TcpStream::connect(server.address()).await.unwrap();
-    let mut idle = server.objects().await;
-    idle.list_objects(v1::ListObjectsRequest::default())
-        .await
-        .unwrap();
-    let address = server.address();
-    bounded("the end", server.stop()).await;
-    // The server's end of the silent connection is closed, and the port is free.
-    let mut buffer = Vec::new();
-    bounded("the end of the connection", silent.read_to_end(&mut buffer))
-        .await
-        .ok();
-    assert!(TcpStream::connect(address).await.is_err());
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn running_calls_are_answered_during_the_drain() {
-    let server = TestServer::start().await;
-    let request = impossible(&server).await.with_budget(Duration::from_millis(700));
-    let mut client = server.grasps().await;
-    let call = tokio::spawn(async move { client.find_grasp(request).await });
-    until("the search", || server.gauges().searches() == 1).await;
-    let stopping = server.begin_stop();
-    let answer = call
-        .await
-        .unwrap()
-        .expect("the call is answered while the server drains");
-    assert_eq!(answer.into_inner().outcome(), v1::Outcome::BudgetExhausted);
-    bounded("the end", stopping.stopped()).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn calls_that_outlast_the_drain_are_cancelled() {
-    let server = TestServer::start_with(|config| {
-        config.drain = Duration::from_millis(50);
-        config.budgets.maximum = Duration::from_mins(10);
-    })
-    .await;
-    let request = impossible(&server).await.with_budget(Duration::from_mins(10));
-    let mut client = server.grasps().await;
-    let call = tokio::spawn(async move { client.find_grasp(request).await });
-    until("the search", || server.gauges().searches() == 1).await;
-    let stopping = server.begin_stop();
-    let gauges = stopping.gauges().clone();
-    bounded("the end", stopping.stopped()).await;
-    let status = bounded("the end of the call", call).await.unwrap().unwrap_err();
-    assert!(
-        matches!(status.code(), Code::Unavailable | Code::Unknown | Code::Cancelled),
-        "{status}"
-    );
-    until("the end of the search", || gauges.searches() == 0).await;
 }

@@ -21,6 +21,7 @@ const SUMMARY: SearchSummary = SearchSummary {
     outcome: "FOUND",
     attempts: 1,
     time: Duration::ZERO,
+    failed_check: None,
 };
 
 /// A call as its service sees it.
@@ -68,6 +69,8 @@ impl Call {
 fn admitting_one() -> Calls {
     Calls {
         door: Arc::new(Door::open(None, false).unwrap()),
+        metrics: Arc::default(),
+        traces: Traces::default(),
         in_flight: watch::Sender::new(()),
         executor: SearchExecutor::new(1, 8).expect("a thread starts"),
         longest_search: Duration::from_secs(10),
@@ -79,6 +82,8 @@ fn admitting_one() -> Calls {
         largest_upload: 1 << 20,
         longest_call: Duration::from_mins(1),
         packers: Arc::new(Semaphore::new(1)),
+        shutdown: CancellationToken::new(),
+        drained: CancellationToken::new(),
     }
 }
 

@@ -33,7 +33,7 @@ use crate::{
     access::Owner,
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
-    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, are_few, seal},
+    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, is_decodable, seal},
     validate::{Labels, RequestKey},
     wire::hex,
 };
@@ -41,9 +41,8 @@ use crate::{
 /// Largest record in bytes.
 const MAX_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
 
-/// The object in a record, and its lists: regions with groups and shapes, and known grips with joints.
+/// The number of the object in a record.
 const OBJECT: usize = 10;
-const LISTS: [&[usize]; 5] = [&[7], &[7, 4], &[7, 6], &[8], &[8, 3, 12]];
 
 /// Records that are read at a time at the start.
 const READ_AT_A_TIME: usize = 16;
@@ -325,7 +324,7 @@ impl SavedObject {
 
     /// The record of the object with this id.
     fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
-        if !are_few(message, &[OBJECT], &LISTS) {
+        if !is_decodable::<v1::GraspObject>(message, OBJECT) {
             return Err(Unreadable::Message);
         }
         let mut saved = Self::decode(message).map_err(|_| Unreadable::Message)?;

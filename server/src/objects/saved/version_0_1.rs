@@ -1,13 +1,12 @@
 //! Records of version 0.1, which are read, but not written: most of their fields have other numbers.
 
-use grasp_proto::v1;
+use grasp_proto::{has_too_many_parts, v1};
 use prost::Message;
 
-use super::LISTS;
 use crate::{
     objects::name_of,
     rigs,
-    saved::{FieldMove, are_few, field, message, move_fields},
+    saved::{FieldMove, field, message, move_fields},
 };
 
 /// The name of the region that was a list of its own.
@@ -124,7 +123,8 @@ struct Origin {
 /// The object of an old record, and the centre of mass that its client gave.
 pub(super) fn read(record: &[u8]) -> Option<(v1::GraspObject, Option<v1::Vector3>)> {
     let OldRecord { given, found } = OldRecord::decode(record).ok()?;
-    let object = move_fields(record, OBJECT).filter(|object| are_few(object, &[], &LISTS))?;
+    let object =
+        move_fields(record, OBJECT).filter(|object| !has_too_many_parts::<v1::GraspObject>(object))?;
     let mut object = v1::GraspObject::decode(&*object).ok()?;
     object.name = name_of(&object.name);
     object.meters_per_unit.get_or_insert(1.0);

@@ -9,6 +9,7 @@
 
 mod cache;
 mod created;
+mod figures;
 mod loading;
 #[cfg(test)]
 mod tests;

@@ -48,7 +48,9 @@ pub(crate) async fn measure(bench: &Bench) -> Result<Vec<Row>, Failure> {
         "recovery from 10 ×",
         Unit::Seconds,
         BACK_AFTER_S,
-        back.map_or(f64::INFINITY, |&(start, _)| (start - end).as_secs_f64()),
+        back.map_or(f64::INFINITY, |&(start, _)| {
+            start.saturating_sub(end).as_secs_f64()
+        }),
         format!(
             "until p99 of {LIGHT_RATE}/s warm calls within {WINDOW:?} is at most {SLACK} × the worst of {AROUND:?} before, {usual:.1} ms; \
              at first {first:.1} ms; overload: {}",

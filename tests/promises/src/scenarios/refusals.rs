@@ -63,7 +63,7 @@ async fn cost_of_refusal(bench: &Bench) -> Result<(f64, usize), Failure> {
     let server = bench.server(&flags)?;
     let call = find_grasp(server.address, LIGHT, &bench.requests.searching).await?;
     let other = connect(server.address, HEAVY).await?;
-    let hopeless = impossible(&other, Duration::from_secs(600)).await?;
+    let hopeless = impossible(&other, Duration::from_mins(10)).await?;
     bench.step("cost of refusals");
     let occupying = tokio::spawn(async move { GraspServiceClient::new(other).find_grasp(hopeless).await });
     tokio::time::sleep(Duration::from_millis(300)).await;

@@ -132,7 +132,8 @@ async fn whatever_is_damaged_of_a_file_is_data_loss_by_name_and_the_rest_is_serv
             "objects/a" => Loss::Record,
             "rigs/mine" => Loss::Rig,
             _ if *path == of_a => Loss::Mesh,
-            _ if relative.starts_with("meshes/") && !relative.ends_with(".grasp")
+            _ if relative.starts_with("meshes/")
+                && path.extension().is_none_or(|extension| extension != "grasp")
                 || relative == "objects/b" =>
             {
                 continue;

@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Longest attack.
-const ENDS_AFTER: Duration = Duration::from_secs(120);
+const ENDS_AFTER: Duration = Duration::from_mins(2);
 
 /// Pause after a refusal, of each task that tries again.
 const RETRIES_AFTER: Duration = Duration::from_millis(100);

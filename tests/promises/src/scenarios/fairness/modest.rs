@@ -153,7 +153,6 @@ impl Modest {
             Resource::Connections => {
                 let named = v1::GetObjectRequest {
                     name: REMOTE.to_owned(),
-                    ..Default::default()
                 };
                 let channel = connect(self.server, LIGHT).await?;
                 ObjectServiceClient::new(channel).get_object(named).await?;

@@ -5,7 +5,7 @@ use std::{collections::HashMap, sync::LazyLock};
 use prost_reflect::{DescriptorPool, MethodDescriptor};
 
 /// A method of a service.
-pub(super) type Method = MethodDescriptor;
+pub(crate) type Method = MethodDescriptor;
 
 /// The contract and the other services of this server, and the types of details of errors.
 static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
@@ -35,12 +35,22 @@ static METHODS: LazyLock<HashMap<String, Method>> = LazyLock::new(|| {
 });
 
 /// The method of a path.
-pub(super) fn method(path: &str) -> Option<&'static Method> {
+pub(crate) fn method(path: &str) -> Option<&'static Method> {
     METHODS.get(path)
 }
 
+/// Every method with its path, in the order of the paths.
+pub(crate) fn methods() -> Vec<(&'static str, &'static Method)> {
+    let mut all: Vec<_> = METHODS
+        .iter()
+        .map(|(path, method)| (path.as_str(), method))
+        .collect();
+    all.sort_unstable_by_key(|(path, _)| *path);
+    all
+}
+
 /// The paths of methods with this name, in any letters, of any service.
-pub(super) fn named_like(path: &str) -> Vec<&'static str> {
+pub(crate) fn named_like(path: &str) -> Vec<&'static str> {
     let name = |path: &str| path.rsplit('/').next().unwrap_or_default().to_ascii_lowercase();
     let wanted = name(path);
     let mut like: Vec<&str> = METHODS
@@ -53,6 +63,6 @@ pub(super) fn named_like(path: &str) -> Vec<&'static str> {
 }
 
 /// The message of this name.
-pub(super) fn message(name: &str) -> Option<prost_reflect::MessageDescriptor> {
+pub(crate) fn message(name: &str) -> Option<prost_reflect::MessageDescriptor> {
     POOL.get_message_by_name(name)
 }

@@ -1,47 +1,43 @@
 //! Starts, runs and shuts down the server.
 
+mod parts;
+
 use std::{
     future::Future,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{Arc, atomic::AtomicU64},
-    thread,
     time::{Duration, Instant},
 };
 
 use futures_util::future::BoxFuture;
-use grasp_assets::hands::{self, RIG_NAMES};
-use grasp_proto::v1::{
-    grasp_service_server::GraspServiceServer, hand_rig_service_server::HandRigServiceServer,
-    object_service_server::ObjectServiceServer,
-};
-use grasp_synthesis::{base::stop::unstopped, model::hand::Handedness};
+use grasp_synthesis::base::stop::unstopped;
 use tokio::{
     net::TcpListener,
     sync::{Semaphore, watch},
 };
 use tokio_util::sync::CancellationToken;
-use tonic::{codec::CompressionEncoding::Gzip, server::NamedService, service::Routes};
-use tonic_health::{ServingStatus, server::HealthReporter};
+use tonic::service::Routes;
 use tonic_web::GrpcWebLayer;
 use tower::{ServiceBuilder, util::option_layer};
 
+use self::parts::{calls, drain, largest_upload, logged, prepare_hands, reflection, services};
 use crate::{
     access::Door,
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
-    call::{BySize, Calls},
     config::{Config, StorePlace},
     connect::{Connect, Transcoding},
     error::Limit,
     executor::SearchExecutor,
     faults::FaultPoint,
-    limits::{BYTES_BESIDES_MESH, ClientPermits, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
+    limits::{ClientPermits, Places},
     listen::Listener,
     middleware::Around,
+    monitor::{Monitor, Phase, Vitals, set_health},
     net::{Connections, Lifetime, Serving, UnreadCount, accept},
     objects::{
         derived::Resizer,
-        directory::{self, DirectoryError, PinnedObject},
+        directory::{self, DirectoryError},
         saved::SavedObjects,
         store::ObjectStore,
     },
@@ -50,19 +46,14 @@ use crate::{
     saved::{SavedFiles, StoreError},
     services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
     tls::Tls,
+    traces::Traces,
     track::OpenTracks,
     viewer::viewer,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
 };
 
-/// Time limit of a call beyond the largest budget: enough to read and build a large mesh.
-const CALL_TIME_BEYOND_BUDGET: Duration = Duration::from_secs(20);
-
 /// When a client whose upload was rejected should retry: after about the time of an upload.
 const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
-
-/// Delay between the last response and closing its connection: time to send it, and for the client to close first.
-const LINGER: Duration = Duration::from_millis(200);
 
 /// Why the server ended or did not start.
 #[derive(Debug, thiserror::Error)]
@@ -93,6 +84,9 @@ pub enum ServeError {
     /// The descriptors of the contract are broken.
     #[error("cannot offer reflection: {0}")]
     Reflection(#[from] tonic_reflection::server::Error),
+    /// Traces cannot be sent.
+    #[error("{0}")]
+    Traces(String),
 }
 
 /// A server that is ready to listen.
@@ -105,6 +99,7 @@ pub struct Server {
     tls: Option<Arc<Tls>>,
     door: Arc<Door>,
     reloader: Reloader,
+    monitor: Option<Listener>,
 }
 
 /// The server's activity, for tests and monitoring.
@@ -219,6 +214,7 @@ impl Server {
             rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), rig_records)),
             resizer: Resizer(Arc::new(Semaphore::new(config.derivations()))),
             executor,
+            metrics: Arc::default(),
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
                 Instant::now(),
@@ -247,7 +243,17 @@ impl Server {
             tls,
             door,
             reloader: Reloader::default(),
+            monitor: None,
         })
+    }
+
+    /// The same, with metrics and answers to probes on a listener of their own.
+    #[must_use]
+    pub fn monitored_on(self, listener: Listener) -> Self {
+        Self {
+            monitor: Some(listener),
+            ..self
+        }
     }
 
     async fn read_saved(&self) -> Result<(), StoreError> {
@@ -305,6 +311,16 @@ impl Server {
         self.serve_boxed(listeners, Box::pin(shutdown)).await
     }
 
+    /// The signs of life, which are served until `close` if there is a listener for that.
+    fn monitored(&mut self, close: &CancellationToken) -> Arc<Vitals> {
+        let vitals = Arc::new(Vitals::default());
+        let monitor = Monitor::new(self.handler.clone(), self.builds.clone(), Arc::clone(&vitals));
+        if let Some(listener) = self.monitor.take() {
+            tokio::spawn(close.clone().run_until_cancelled_owned(monitor.serve(listener)));
+        }
+        vitals
+    }
+
     /// Serves. Boxed and without type parameters, so that handlers and transport are compiled with this crate and not once more
     /// with every program that starts a server.
     fn serve_boxed(
@@ -316,10 +332,15 @@ impl Server {
     }
 
     async fn serve_until(
-        self,
+        mut self,
         listeners: Vec<Listener>,
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
+        let close = CancellationToken::new();
+        let _close_at_the_end = close.clone().drop_guard();
+        let vitals = self.monitored(&close);
+        let traces = Traces::start(self.handler.config.otlp_endpoint.as_deref());
+        let traces = traces.map_err(ServeError::Traces)?;
         if let Err(error) = self.read_saved().await {
             if let Some(files) = &self.files {
                 files.give_back().await;
@@ -333,32 +354,19 @@ impl Server {
             tls,
             door,
             reloader,
+            ..
         } = self;
         let config = &handler.config;
         let largest_upload = largest_upload(config);
-        let grasps = GraspServiceServer::new(handler.clone())
-            .accept_compressed(Gzip)
-            .max_decoding_message_size(MAX_FIND_REQUEST)
-            .max_encoding_message_size(MAX_RESPONSE);
-        let objects = ObjectServiceServer::new(handler.clone())
-            .accept_compressed(Gzip)
-            .max_encoding_message_size(MAX_RESPONSE);
-        let objects = BySize {
-            small: objects.clone().max_decoding_message_size(MAX_FIND_REQUEST),
-            large: objects.max_decoding_message_size(largest_upload),
-        };
-        let rigs = HandRigServiceServer::new(handler.clone())
-            .accept_compressed(Gzip)
-            .max_encoding_message_size(MAX_RESPONSE);
-        let rigs = BySize {
-            small: rigs.clone().max_decoding_message_size(MAX_FIND_REQUEST),
-            large: rigs.max_decoding_message_size(largest_upload),
-        };
+        let (grasps, objects, rigs) = services(&handler);
         let (health, health_service) = tonic_health::server::health_reporter();
-        set_health(&health, ServingStatus::Serving).await;
+        set_health(&health, true, true).await;
+        let watch = Arc::clone(&vitals).watch(handler.executor.clone(), files.clone(), health.clone());
+        tokio::spawn(close.clone().run_until_cancelled_owned(watch));
+        vitals.enter(Phase::Serving);
 
         let stop = handler.shutdown.clone();
-        let close = CancellationToken::new();
+        let drained = CancellationToken::new();
         let origins = Arc::new(config.web_origins.clone());
         let is_web = *origins != WebOrigins::NONE;
         let packers = Arc::new(Semaphore::new(config.io_threads.get()));
@@ -376,7 +384,9 @@ impl Server {
             .layer(refuse_protocols(is_web))
             .layer(Around(Connect))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(Around(calls(&handler, Arc::clone(&door), builds, &packers)))
+            .layer(Around(calls(
+                &handler, &door, builds, &packers, &traces, &drained,
+            )))
             .layer(Around(Transcoding {
                 largest_upload,
                 places: packers,
@@ -396,22 +406,14 @@ impl Server {
 
         // Stops all tasks, however this function ends.
         let _builders_end = handler.atlases.stopper();
-        let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
         let mut watched = vec![Watched::new(door)];
         watched.extend(tls.map(|tls| Watched::new(tls)));
         let shutting_down = async {
             shutdown.await;
-            tracing::info!(calls = handler.calls.receiver_count(), "draining");
-            drop(handler.atlases.stopper());
-            set_health(&health, ServingStatus::NotServing).await;
-            stop.cancel();
-            let drained = tokio::time::timeout(config.drain, handler.calls.closed()).await;
-            if drained.is_err() {
-                let calls = handler.calls.receiver_count();
-                tracing::warn!(calls, "the drain time has passed; cutting off running calls");
-            }
-            tokio::time::sleep(LINGER).await;
+            vitals.enter(Phase::Draining);
+            set_health(&health, false, false).await;
+            drain(&handler, &drained).await;
             // The transport would wait for idle connections and open streams forever.
             close.cancel();
             std::future::pending::<()>().await;
@@ -432,73 +434,9 @@ impl Server {
         if let Some(files) = &files {
             files.give_back().await;
         }
+        // The last calls end with their connections.
+        let _ = tokio::task::spawn_blocking(move || traces.finish()).await;
         tracing::info!("stopped");
         Ok(())
-    }
-}
-
-fn logged(path: &Path, objects: Vec<PinnedObject>) -> Vec<PinnedObject> {
-    for PinnedObject { object, .. } in &objects {
-        for warning in &object.warnings {
-            tracing::warn!(
-                object = object.name(),
-                warning,
-                "an object of the objects directory has a warning"
-            );
-        }
-    }
-    tracing::info!(directory = %path.display(), objects = objects.len(), "read the objects directory");
-    objects
-}
-
-/// Loads the built-in hands and prepares them for searches. The first call with each hand would otherwise do so,
-/// outside its budget: it takes tenths of a second.
-fn prepare_hands() {
-    thread::scope(|scope| {
-        for rig in RIG_NAMES {
-            for handedness in [Handedness::Left, Handedness::Right] {
-                scope.spawn(move || hands::hand(rig, handedness).map(|hand| hand.rig.oppositions()));
-            }
-        }
-    });
-}
-
-fn reflection() -> tonic_reflection::server::Builder<'static> {
-    tonic_reflection::server::Builder::configure()
-        .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
-        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
-}
-
-/// Largest message of an upload, in bytes.
-fn largest_upload(config: &Config) -> usize {
-    config.maximum_object_bytes.get() + BYTES_BESIDES_MESH
-}
-
-fn calls(handler: &Handler, door: Arc<Door>, builds: Places, packers: &Arc<Semaphore>) -> Calls {
-    let config = &handler.config;
-    Calls {
-        door,
-        in_flight: handler.calls.clone(),
-        executor: handler.executor.clone(),
-        longest_search: config.budgets.maximum,
-        uploads: builds,
-        heavy: Arc::clone(&handler.heavy),
-        reads: Arc::default(),
-        upload_grace: 2 * config.streams.upload_idle,
-        packers: Arc::clone(packers),
-        largest_upload: largest_upload(config),
-        reserve: Arc::clone(&handler.reserve),
-        longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
-    }
-}
-
-async fn set_health(health: &HealthReporter, status: ServingStatus) {
-    for service in [
-        "",
-        GraspServiceServer::<Handler>::NAME,
-        ObjectServiceServer::<Handler>::NAME,
-        HandRigServiceServer::<Handler>::NAME,
-    ] {
-        health.set_service_status(service, status).await;
     }
 }
