@@ -244,7 +244,7 @@ fn readable_status(answer: &Answer) -> tonic::Status {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn calls_beyond_the_limit_of_a_connection_are_shed_readably() {
-    let server = TestServer::start().await;
+    let server = TestServer::start_with(|config| config.maximum_searches = 256.try_into().unwrap()).await;
     let mut browser = Connection::open(&server, 1 << 20).await;
     let mut running = Vec::new();
     for _ in 0..CALLS {
