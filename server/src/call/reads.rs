@@ -47,7 +47,9 @@ pub(crate) struct Reads {
 }
 
 /// The place of a call, until the end of its answer.
-pub(super) struct ReadPlace(Place);
+pub(super) struct ReadPlace {
+    _place: Place,
+}
 
 impl Default for Reads {
     fn default() -> Self {
@@ -61,7 +63,7 @@ impl Default for Reads {
 impl Reads {
     /// Lets a client's call wait for its turn.
     pub(super) fn enter(&self, client: &Client) -> Result<ReadPlace, ServiceError> {
-        self.places.take(client).map(ReadPlace)
+        self.places.take(client).map(|_place| ReadPlace { _place })
     }
 
     /// A turn for a call that has entered, once others of its client are handled. It must not last until the client has read the
