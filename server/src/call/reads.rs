@@ -63,7 +63,7 @@ impl Default for Reads {
 impl Reads {
     /// Lets a client's call wait for its turn.
     pub(super) fn enter(&self, client: &Client) -> Result<ReadPlace, ServiceError> {
-        self.places.take(client).map(|_place| ReadPlace { _place })
+        self.places.take(client).map(|place| ReadPlace { _place: place })
     }
 
     /// A turn for a call that has entered, once others of its client are handled. It must not last until the client has read the
