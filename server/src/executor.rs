@@ -9,6 +9,7 @@ use std::{
         Arc,
         atomic::{AtomicU64, Ordering},
     },
+    thread,
     time::{Duration, Instant},
 };
 
@@ -16,7 +17,7 @@ use futures_util::FutureExt as _;
 use grasp_admission::{Gate, Job, TooLate};
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::OwnedSemaphorePermit;
+use tokio::sync::{OwnedSemaphorePermit, oneshot};
 
 use crate::{
     client::Client,
@@ -32,6 +33,9 @@ pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
+
+/// Niceness of threads that build for a call. Beside busy searches, a thread has a tenth of a core.
+const BUILD_NICENESS: i32 = 10;
 
 /// Jobs that have a turn at once. Each uses all workers; another one's slice would come before its next.
 const TURNS: usize = 1;
@@ -259,10 +263,36 @@ pub(crate) async fn run_blocking<T: Send + 'static>(
     })
 }
 
+/// Runs long work on a thread of its own, which leaves the cores to searches. The work must not hold a lock that searches wait for.
+pub(crate) async fn run_behind_searches<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, ServiceError> {
+    let (sender, output) = oneshot::channel();
+    let thread = thread::Builder::new()
+        .name("grasp-build".to_owned())
+        .spawn(move || {
+            lower_priority(BUILD_NICENESS);
+            // A panic drops the sender; the panic hook has logged it.
+            let _ = sender.send(work());
+        });
+    if let Err(error) = thread {
+        tracing::error!(%error, "no thread starts");
+    }
+    output.await.map_err(|_| ServiceError::Panicked)
+}
+
+/// Lowers the priority of this thread, where the system supports that. Raising it again would need privileges.
+pub(crate) fn lower_priority(niceness: i32) {
+    #[cfg(target_os = "linux")]
+    if let Err(error) = rustix::process::nice(niceness) {
+        tracing::warn!(%error, "a thread runs at the priority of searches");
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = niceness;
+}
+
 #[cfg(test)]
 mod tests {
-    use std::thread;
-
     use super::*;
 
     #[tokio::test]

@@ -18,7 +18,7 @@ use grasp_synthesis::{
 use super::{files::AtlasFiles, growing::work};
 use crate::{
     atlas_slots::Demand,
-    executor::SearchExecutor,
+    executor::{SearchExecutor, lower_priority},
     objects::{
         StoredObject,
         store::{Need, ObjectStore},
@@ -26,7 +26,6 @@ use crate::{
 };
 
 /// Niceness of a builder thread: 19 is the lowest priority on Linux. A lower value takes more CPU time from searches.
-#[cfg(target_os = "linux")]
 const NICENESS: i32 = 19;
 
 /// State shared by the builder threads.
@@ -99,21 +98,13 @@ pub(super) fn start_thread(builders: &Arc<Builders>, name: String, grows: bool) 
     let builders = Arc::clone(builders);
     let thread = thread::Builder::new().name(name).spawn(move || {
         if grows {
-            lower_priority();
+            lower_priority(NICENESS);
         }
         while let Some(job) = builders.queue.next(grows) {
             work(&builders, job);
         }
     });
     thread.map(|_| ())
-}
-
-/// Lowers the priority of this thread, where the system supports that. Raising it again would need privileges.
-fn lower_priority() {
-    #[cfg(target_os = "linux")]
-    if let Err(error) = rustix::process::nice(NICENESS) {
-        tracing::warn!(%error, "atlases are built at the priority of searches");
-    }
 }
 
 /// Worth of completing an atlas, relative to making another useful: a ninth of the calls, for six times the work.

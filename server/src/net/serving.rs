@@ -41,8 +41,9 @@ const PREFACE_TIME: Duration = Duration::from_secs(5);
 /// Largest number of open streams per connection.
 const STREAMS_PER_CONNECTION: u32 = 100;
 
-/// Largest number of streams that a client may open and reset before the server has seen them.
-const PENDING_RESETS: usize = 20;
+/// Largest number of streams that a client may open and reset before the server has seen them: all of its calls, when it gives them
+/// up because the server is busy. The budget of frames bounds how often.
+const PENDING_RESETS: usize = STREAMS_PER_CONNECTION as usize;
 
 /// Flow-control window of a stream, in bytes.
 const STREAM_WINDOW: u32 = 256 << 10;

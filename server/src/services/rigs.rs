@@ -33,7 +33,7 @@ use crate::{
     call::{CallContext, UploadPermit},
     convention::Convention,
     error::ServiceError,
-    executor::run_blocking,
+    executor::{run_behind_searches, run_blocking},
     rigs::{
         RigHand, StoredRig, name_of,
         store::{RigStore, saved_request},
@@ -99,8 +99,7 @@ impl HandRigService for Handler {
         let permit = UploadPermit::of(&mut request);
         permit.take_turn().await?;
         let (shared, request) = (Arc::clone(&self.0), request.into_inner());
-        let rig = run_blocking(move || {
-            let _permit = permit;
+        let built = run_behind_searches(move || {
             let limits = shared.config.mesh_limits(shared.config.maximum_object_bytes);
             let violations = Violations::default();
             let owner = caller.owner();
@@ -113,9 +112,14 @@ impl HandRigService for Handler {
             let mut rig = build_rig(fields, owner, limits, violations)?;
             prepare_rig(&rig);
             try_rig(&mut rig)?;
-            shared.rigs.insert(rig, record)
+            Ok::<_, ServiceError>((permit, shared, rig, record))
         });
-        let rig = rig.await??;
+        let (permit, shared, rig, record) = built.await??;
+        let rig = run_blocking(move || {
+            let _permit = permit;
+            shared.rigs.insert(rig, record)
+        })
+        .await??;
         Ok(Response::new(rig_message(&rig)))
     }
 
