@@ -92,7 +92,7 @@ def test_default_memory_matches_the_page():
     in_memory = (
         value["cache_bytes"]
         + value["maximum_uploads"] * value["maximum_object_bytes"]
-        + value["maximum_upload_bytes"]
+        + value["maximum_upload_bytes"] * 3 // 2
         + value["maximum_unread_bytes"]
     )
     saved = in_memory + max(value["maximum_object_bytes"], value["maximum_upload_bytes"])
