@@ -1,5 +1,5 @@
 //! Measures the service's promises under load: starts a server process, drives it from this one, and prints each promise with its target
-//! and the figure. Exits with 1 if a promise is broken.
+//! and the figure. Exits with 1 if a promise is broken, with 77 if some could not be proven because other programs were busy.
 
 mod bench;
 mod cores;
@@ -15,6 +15,7 @@ use clap::{Parser, ValueEnum as _};
 
 use crate::{
     bench::Bench,
+    cores::TimeOfOthers,
     report::{Row, table},
     scenarios::Scenario,
 };
@@ -46,8 +47,7 @@ struct Flags {
 
 fn main() -> ExitCode {
     match measure(Flags::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
+        Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(2)
@@ -55,8 +55,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// True if every promise is kept.
-fn measure(flags: Flags) -> Result<bool, Failure> {
+fn measure(flags: Flags) -> Result<ExitCode, Failure> {
     let program = match flags.server {
         Some(program) => program,
         None => std::env::current_exe()?.with_file_name("grasp-server"),
@@ -75,14 +74,29 @@ fn measure(flags: Flags) -> Result<bool, Failure> {
     if let Some(path) = flags.json {
         fs::write(path, serde_json::to_vec_pretty(&rows)?)?;
     }
-    Ok(rows.iter().all(Row::is_kept))
+    let missed: Vec<&Row> = rows.iter().filter(|row| !row.is_kept()).collect();
+    Ok(if missed.is_empty() {
+        ExitCode::SUCCESS
+    } else if missed.iter().all(|row| row.is_disturbed()) {
+        ExitCode::from(77)
+    } else {
+        ExitCode::from(1)
+    })
 }
 
 /// The rows of a scenario, the best of each if some were missed.
 fn best_rows(bench: &Bench, scenario: Scenario, tries: usize) -> Vec<Row> {
+    let measure_once = || {
+        let before = TimeOfOthers::now()?;
+        let mut rows = bench.measure(scenario)?;
+        let cores = TimeOfOthers::now()?.cores_since(before);
+        for row in &mut rows {
+            row.cores_of_others = cores;
+        }
+        Ok::<_, Failure>(rows)
+    };
     let measure = || {
-        let rows = bench.measure(scenario);
-        rows.unwrap_or_else(|error| {
+        measure_once().unwrap_or_else(|error| {
             vec![Row::failed(
                 &format!("{scenario:?}").to_lowercase(),
                 error.to_string(),

@@ -57,7 +57,12 @@ pub(crate) struct Row {
     pub(crate) measured: f64,
     /// How it was measured, and figures that explain it.
     pub(crate) how: String,
+    /// Cores that other programs took meanwhile, in the mean.
+    pub(crate) cores_of_others: f64,
 }
+
+/// Cores of other programs beyond which a missed bound shows nothing.
+const MAX_CORES_OF_OTHERS: f64 = 0.1;
 
 impl Row {
     /// A promise that the figure is not less than a bound.
@@ -99,6 +104,7 @@ impl Row {
             unit,
             measured,
             how,
+            cores_of_others: 0.0,
         }
     }
 
@@ -111,12 +117,22 @@ impl Row {
         }
     }
 
-    /// The better of two measurements of the same promise; the later one of those that are only stated.
+    /// True if other programs may be why a bound was missed.
+    pub(crate) fn is_disturbed(&self) -> bool {
+        self.cores_of_others > MAX_CORES_OF_OTHERS
+    }
+
+    /// The better of two measurements of the same promise; the later one of those that are only stated, and of missed ones the one that
+    /// was not disturbed.
     pub(crate) fn better(self, later: Self) -> Self {
+        let is_first_higher = self.measured > later.measured;
         let is_first_better = match self.target {
-            Target::AtLeast { .. } => later.measured.is_nan() || self.measured > later.measured,
-            Target::AtMost { .. } => later.measured.is_nan() || self.measured < later.measured,
             Target::Stated => false,
+            _ if self.is_kept() != later.is_kept() => self.is_kept(),
+            _ if !self.is_kept() && self.is_disturbed() != later.is_disturbed() => later.is_disturbed(),
+            _ if later.measured.is_nan() => true,
+            Target::AtLeast { .. } => is_first_higher,
+            Target::AtMost { .. } => !is_first_higher,
         };
         if is_first_better { self } else { later }
     }
@@ -128,6 +144,7 @@ impl Row {
             Target::Stated => return "",
         };
         match (self.is_kept(), reaches_aim) {
+            (false, _) if self.is_disturbed() => "missed beside other programs",
             (false, _) => "MISSED",
             (true, false) => "kept",
             (true, true) => "kept, aim reached",

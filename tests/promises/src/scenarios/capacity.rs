@@ -118,10 +118,9 @@ async fn security(bench: &Bench) -> Result<Row, Failure> {
         // The first round reads atlases.
         if number >= requests.len() {
             added.push(both[1] - both[0]);
-            latencies
-                .iter_mut()
-                .zip(both)
-                .for_each(|(all, one)| all.push(one));
+            for (all, one) in latencies.iter_mut().zip(both) {
+                all.push(one);
+            }
         }
     }
     let [without, with] = latencies.map(|all| quantile(&all, 0.5));
