@@ -134,13 +134,6 @@ impl RigStore {
         })
     }
 
-    /// Checks that a rig, if it exists, does not belong to another client.
-    pub(crate) fn check_owned(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
-        let created = self.created();
-        let rig = created.get(id).and_then(Option::as_ref);
-        rig.map_or(Ok(()), |rig| caller.check_owns(&rig.name(), &rig.owner))
-    }
-
     /// The records; `None` if rigs are in memory only.
     pub(crate) fn saved(&self) -> Option<&Records> {
         self.saved.as_ref()
@@ -187,14 +180,17 @@ impl RigStore {
         rig
     }
 
-    /// Removes a created rig.
-    pub(crate) fn delete(&self, id: &str) -> Result<(), ServiceError> {
-        if self.built_in.contains_key(id) {
+    /// Removes a created rig of the caller or of everybody. The owner of a damaged one is not known.
+    pub(crate) fn delete(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
+        if self.is_built_in(id) {
             return Err(ServiceError::RigBuiltIn { name: name_of(id) });
         }
         let _changing = self.changing();
-        if !self.created().contains_key(id) {
-            return Err(ServiceError::RigNotFound { name: name_of(id) });
+        match self.created().get(id) {
+            None => return Err(ServiceError::RigNotFound { name: name_of(id) }),
+            Some(rig) => rig
+                .iter()
+                .try_for_each(|rig| caller.check_owns(&rig.name(), &rig.owner))?,
         }
         if let Some(saved) = &self.saved {
             let mut others = self.ids();
@@ -351,7 +347,7 @@ mod tests {
         let full = ServiceError::RigsFull { maximum: 2 };
         assert_eq!(store.check_room("c"), Err(full.clone()));
         assert_eq!(store.insert(rig("c"), None).unwrap_err(), full);
-        store.delete("a").unwrap();
+        store.delete("a", &Caller::default()).unwrap();
         store.insert(rig("c"), None).unwrap();
         let listed: Vec<String> = store.page(None, 10).0.into_iter().map(|(id, _)| id).collect();
         assert_eq!(listed, ["adult", "b", "c", "thesis"]);
@@ -375,18 +371,11 @@ mod tests {
             name: name_of("one0"),
             owner: "one".to_owned(),
         };
-        assert_eq!(store.check_owned("one0", &Caller::named("two")), Err(theirs));
-        assert_eq!(store.check_owned("one0", &one), Ok(()));
-        assert_eq!(
-            store.check_owned("one0", &Caller::default()),
-            Ok(()),
-            "without tokens, it is everybody's"
-        );
-        assert_eq!(
-            fill(&Caller::default(), "all"),
-            1,
-            "nothing is kept for others then"
-        );
+        assert_eq!(store.delete("one0", &Caller::named("two")), Err(theirs));
+        store.delete("one0", &one).unwrap();
+        // Without tokens, everything is everybody's, and nothing is kept for others.
+        store.delete("one1", &Caller::default()).unwrap();
+        assert_eq!(fill(&Caller::default(), "all"), 3);
     }
 
     #[test]

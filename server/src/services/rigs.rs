@@ -122,11 +122,7 @@ impl HandRigService for Handler {
     async fn delete_rig(&self, request: Request<v1::DeleteRigRequest>) -> Result<Response<()>, Status> {
         let id = checked_id(&request.get_ref().name, rig_id_of)?;
         let caller = CallContext::of(&request).caller;
-        let delete = move |shared: &Shared| {
-            // No other deletion runs meanwhile.
-            shared.rigs.check_owned(&id, &caller)?;
-            shared.rigs.delete(&id)
-        };
+        let delete = move |shared: &Shared| shared.rigs.delete(&id, &caller);
         Ok(Response::new(self.delete_in_turn(delete).await?))
     }
 }

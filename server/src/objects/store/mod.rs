@@ -253,13 +253,6 @@ impl ObjectStore {
         }
     }
 
-    /// Checks that an object, if it exists, does not belong to another client.
-    pub(crate) fn check_owned(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
-        let created = self.created();
-        let owner = created.objects.get(id).map(|entry| &entry.state.record.owner);
-        owner.map_or(Ok(()), |owner| caller.check_owns(&name_of(id), owner))
-    }
-
     /// The object with this id if a client may change it and it has the given etag.
     ///
     /// # Errors
@@ -338,10 +331,18 @@ impl ObjectStore {
         })
     }
 
-    pub(crate) fn remove(&self, id: &str, etag: Option<&str>) -> Result<(), ServiceError> {
+    /// Removes an object of the caller or of everybody.
+    ///
+    /// # Errors
+    /// Those of [`Self::changeable`], and [`ServiceError::NotOwner`].
+    pub(crate) fn remove(&self, id: &str, etag: Option<&str>, caller: &Caller) -> Result<(), ServiceError> {
         self.check_changeable(id)?;
         let mut mesh_uses = self.changing();
-        let mesh = self.created().entry_with(id, etag)?.mesh;
+        let mesh = {
+            let mut created = self.created();
+            caller.check_owns(&name_of(id), &created.entry(id)?.state.record.owner)?;
+            created.entry_with(id, etag)?.mesh
+        };
         if let Some(saved) = &self.saved {
             let mut others = self.ids();
             others.retain(|other| other != id);
