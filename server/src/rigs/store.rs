@@ -4,7 +4,10 @@
 use std::{
     collections::BTreeMap,
     ops::Bound,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use bytes::Bytes;
@@ -19,7 +22,7 @@ use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
     access::{Caller, Owner},
     error::ServiceError,
-    limits::BYTES_BESIDES_MESH,
+    limits::{BYTES_BESIDES_MESH, locked},
     saved::{
         FieldMove, RIGS, Records, SavedFiles, Unreadable, field, is_decodable, message, move_fields, seal,
         wait_for,
@@ -39,6 +42,8 @@ pub(crate) struct RigStore {
     maximum: usize,
     /// `None` if rigs are in memory only.
     saved: Option<Records>,
+    /// True once a call has met a damaged rig since they were last read.
+    is_damage_met: AtomicBool,
     scaled: ScaledHands,
 }
 
@@ -60,6 +65,7 @@ impl RigStore {
             changing: Mutex::default(),
             maximum,
             saved,
+            is_damage_met: AtomicBool::new(false),
             scaled: ScaledHands::default(),
         }
     }
@@ -85,10 +91,26 @@ impl RigStore {
         })
     }
 
-    /// True if the record of the rig that a request names is damaged or missing.
+    /// True if the record of the rig that a request names is damaged or missing. It is read again soon.
     pub(crate) fn is_damaged(&self, name: &str) -> bool {
-        let id = name.strip_prefix(COLLECTION);
-        id.is_some_and(|id| self.created().get(id).is_some_and(Option::is_none))
+        let is_damaged = name
+            .strip_prefix(COLLECTION)
+            .is_some_and(|id| self.has_damaged(id));
+        self.is_damage_met.fetch_or(is_damaged, Ordering::Relaxed);
+        is_damaged
+    }
+
+    pub(crate) fn has_damaged(&self, id: &str) -> bool {
+        self.created().get(id).is_some_and(Option::is_none)
+    }
+
+    /// True if a call has met a damaged rig since the last time.
+    pub(crate) fn take_damage_met(&self) -> bool {
+        self.is_damage_met.swap(false, Ordering::Relaxed)
+    }
+
+    pub(crate) fn is_built_in(&self, id: &str) -> bool {
+        self.built_in.contains_key(id)
     }
 
     /// Keeps the name of a rig whose record is damaged or missing.
@@ -109,7 +131,7 @@ impl RigStore {
 
     /// Checks that a rig can be added: called before a rig is made, so that none is made in vain.
     pub(crate) fn check_room(&self, id: &str) -> Result<(), ServiceError> {
-        if self.built_in.contains_key(id) || self.created().contains_key(id) {
+        if self.is_built_in(id) || self.created().contains_key(id) {
             return Err(ServiceError::RigExists { name: name_of(id) });
         }
         if self.created().len() >= self.maximum {
@@ -213,6 +235,8 @@ impl RigStore {
         rigs.sort_by(|(a, _), (b, _)| a.cmp(b));
         let more = rigs.len() > size;
         rigs.truncate(size);
+        let is_damaged = rigs.iter().any(|(_, rig)| rig.is_none());
+        self.is_damage_met.fetch_or(is_damaged, Ordering::Relaxed);
         (rigs, more)
     }
 
@@ -227,12 +251,11 @@ impl RigStore {
     }
 
     fn changing(&self) -> MutexGuard<'_, ()> {
-        self.changing.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.changing)
     }
 
     fn created(&self) -> MutexGuard<'_, CreatedRigs> {
-        // No code panics while it holds the lock; if some did, the map would still be consistent.
-        self.created.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.created)
     }
 }
 
