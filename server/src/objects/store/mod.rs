@@ -17,7 +17,7 @@ mod watching;
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard},
     time::{Duration, SystemTime},
 };
 
@@ -39,8 +39,8 @@ use super::{
 use crate::{
     access::{Caller, Owner},
     error::ServiceError,
-    limits::StoreLimits,
-    saved::{NotCreated, wait_for},
+    limits::{StoreLimits, locked},
+    saved::{CreateFailure, wait_for},
     validate::{Labels, PageQuery, RequestKey},
 };
 
@@ -385,14 +385,12 @@ impl ObjectStore {
     }
 
     fn created(&self) -> MutexGuard<'_, Created> {
-        // No code panics while it holds the lock; if some did, the map would still be consistent.
-        self.created.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.created)
     }
 
     /// Waits until no other call adds, changes or deletes an object, and keeps them waiting.
     fn changing(&self) -> MutexGuard<'_, MeshUses> {
-        // No code panics while it holds the lock; if some did, a mesh might be kept in vain.
-        self.mesh_uses.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.mesh_uses)
     }
 }
 
