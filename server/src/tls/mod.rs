@@ -16,6 +16,7 @@ use rustls::{
     pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject as _},
     server::{WebPkiClientVerifier, danger::ClientCertVerifier},
 };
+use uuid::Uuid;
 
 use self::certificate::expiry;
 pub(crate) use self::{
@@ -115,6 +116,22 @@ impl Reloadable for Tls {
 /// The cryptography of every connection, whatever else the program links.
 pub(crate) fn provider() -> Arc<CryptoProvider> {
     Arc::new(ring::default_provider())
+}
+
+/// Bytes that nobody can guess. `None` if the system has no randomness.
+pub(crate) fn random_bytes<const N: usize>() -> Option<[u8; N]> {
+    let mut bytes = [0; N];
+    provider().secure_random.fill(&mut bytes).ok()?;
+    Some(bytes)
+}
+
+/// An id that nobody can guess, and that no other server has.
+///
+/// # Panics
+/// The system has no randomness.
+pub(crate) fn random_id() -> Uuid {
+    let bytes = random_bytes().expect("the system has randomness");
+    uuid::Builder::from_random_bytes(bytes).into_uuid()
 }
 
 fn load(files: &TlsFiles) -> Result<Current, Vec<String>> {
