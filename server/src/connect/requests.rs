@@ -10,6 +10,7 @@ use super::{
 use crate::{
     error::ServiceError,
     methods::{Method, method, named_like},
+    middleware::is_gzip_among,
     wire::quoted,
 };
 
@@ -82,7 +83,7 @@ pub(super) fn call(head: &mut Parts, format: Format) -> Result<Call, Refusal> {
         }
     };
     let accepts = match headers.remove(&accepted) {
-        Some(accepted) => accepted.to_str().is_ok_and(accepts_gzip),
+        Some(accepted) => is_gzip_among(&accepted),
         None => packed,
     };
     if accepts {
@@ -154,11 +155,4 @@ fn grpc_timeout(millis: &HeaderValue) -> Option<HeaderValue> {
         format!("{}S", millis.div_ceil(1000))
     };
     timeout.parse().ok()
-}
-
-fn accepts_gzip(accepted: &str) -> bool {
-    accepted.split(',').any(|coding| {
-        let mut parts = coding.split(';').map(str::trim);
-        parts.next() == Some("gzip") && !parts.any(|weight| weight == "q=0")
-    })
 }
