@@ -112,7 +112,6 @@ fn a_store_without_all_of_its_meshes_or_records_is_refused_and_left_as_it_is() {
     }
 }
 
-#[cfg(unix)]
 #[test]
 fn folders_and_files_are_private_to_their_user() {
     use std::os::unix::fs::PermissionsExt as _;
