@@ -29,14 +29,15 @@ pub(crate) async fn accept<S: Service>(
     stop: CancellationToken,
 ) {
     let tasks = TaskTracker::new();
-    let accepting = async {
+    let spawning = tasks.clone();
+    let accepting = async move {
         let mut pause = FIRST_PAUSE;
         loop {
             match accept_any(&mut listeners).await {
                 Ok((stream, client)) => {
                     pause = FIRST_PAUSE;
                     if let Some(place) = connections.admit(&client) {
-                        tasks.spawn(serving.clone().serve(stream, place));
+                        spawning.spawn(server.clone().serve(stream, place));
                     } else {
                         tracing::debug!(%client, "refused a connection");
                     }
@@ -54,7 +55,6 @@ pub(crate) async fn accept<S: Service>(
         }
     };
     stop.run_until_cancelled(accepting).await;
-    drop(listeners);
     tasks.close();
     tasks.wait().await;
 }

@@ -16,11 +16,10 @@ use tokio::{
     sync::{Semaphore, watch},
 };
 use tokio_util::sync::CancellationToken;
-use tonic::service::Routes;
 use tonic_web::GrpcWebLayer;
 use tower::{ServiceBuilder, util::option_layer};
 
-use self::parts::{calls, drain, largest_upload, logged, prepare_hands, reflection, services};
+use self::parts::{calls, drain, largest_upload, logged, prepare_hands, routes};
 use crate::{
     access::Door,
     atlases::{Atlases, files::AtlasFiles},
@@ -358,7 +357,6 @@ impl Server {
         } = self;
         let config = &handler.config;
         let largest_upload = largest_upload(config);
-        let (grasps, objects, rigs) = services(&handler);
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, true, true).await;
         let watch = Arc::clone(&vitals).watch(handler.executor.clone(), files.clone(), health.clone());
@@ -370,12 +368,7 @@ impl Server {
         let origins = Arc::new(config.web_origins.clone());
         let is_web = *origins != WebOrigins::NONE;
         let packers = Arc::new(Semaphore::new(config.io_threads.get()));
-        let routes = Routes::new(grasps)
-            .add_service(objects)
-            .add_service(rigs)
-            .add_service(health_service)
-            .add_service(reflection().build_v1()?)
-            .add_service(reflection().build_v1alpha()?);
+        let routes = routes(&handler, health_service)?;
         let service = ServiceBuilder::new()
             .layer(Around(UnreadCount))
             .layer(refuse_origins(&origins))
@@ -391,8 +384,8 @@ impl Server {
                 largest_upload,
                 places: packers,
             }))
-            .service(routes.prepare());
-        let serving = Serving {
+            .service(routes);
+        let server = ConnectionServer {
             service,
             tls: tls.clone(),
             lifetime: Lifetime {
