@@ -55,14 +55,14 @@ fn stamps(of: &dyn Reloadable) -> Stamps {
 
 /// A reloadable with the state of its files.
 #[derive(Debug)]
-pub(crate) struct Watched {
+pub(crate) struct WatchedFiles {
     source: Arc<dyn Reloadable>,
     loaded: Stamps,
     /// At the last look.
     seen: Stamps,
 }
 
-impl Watched {
+impl WatchedFiles {
     /// Watches what was just read.
     pub(crate) fn new(source: Arc<dyn Reloadable>) -> Self {
         source.remind();
@@ -103,7 +103,7 @@ impl Watched {
 }
 
 /// Reads what changes until it is dropped.
-pub(crate) async fn keep_current(mut watched: Vec<Watched>, reloader: Reloader) {
+pub(crate) async fn keep_current(mut watched: Vec<WatchedFiles>, reloader: Reloader) {
     let mut check = tokio::time::interval(CHECK);
     check.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut reminded = Instant::now();

@@ -40,7 +40,7 @@ use crate::{
         saved::SavedObjects,
         store::ObjectStore,
     },
-    reload::{Reloader, Watched, keep_current},
+    reload::{Reloader, WatchedFiles, keep_current},
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
@@ -97,6 +97,8 @@ pub struct Server {
     builds: Places,
     tls: Option<Arc<Tls>>,
     door: Arc<Door>,
+    /// Certificates and tokens.
+    watched: Vec<WatchedFiles>,
     reloader: Reloader,
     monitor: Option<Listener>,
 }
@@ -168,6 +170,8 @@ impl Server {
                 ));
             }
         };
+        let mut watched = vec![WatchedFiles::new(Arc::clone(&door) as Arc<_>)];
+        watched.extend(tls.clone().map(|tls| WatchedFiles::new(tls)));
         prepare_hands();
         let directory = match &config.objects_directory {
             Some(path) => {
@@ -241,6 +245,7 @@ impl Server {
             builds,
             tls,
             door,
+            watched,
             reloader: Reloader::default(),
             monitor: None,
         })
@@ -352,6 +357,7 @@ impl Server {
             builds,
             tls,
             door,
+            watched,
             reloader,
             ..
         } = self;
@@ -400,8 +406,6 @@ impl Server {
         // Stops all tasks, however this function ends.
         let _builders_end = handler.atlases.stopper();
         let _stop_at_the_end = stop.clone().drop_guard();
-        let mut watched = vec![Watched::new(door)];
-        watched.extend(tls.map(|tls| Watched::new(tls)));
         let shutting_down = async {
             shutdown.await;
             vitals.enter(Phase::Draining);
