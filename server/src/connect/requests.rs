@@ -1,4 +1,4 @@
-//! Requests: their headers, turned into gRPC's.
+//! Requests: their headers, converted to gRPC's.
 
 use http::{HeaderMap, HeaderName, HeaderValue, Response, StatusCode, Version, header, request::Parts};
 use tonic::{Status, body::Body};
@@ -29,7 +29,7 @@ const OF_GRPC: [&str; 3] = ["grpc-timeout", "grpc-encoding", "grpc-accept-encodi
 /// The answer to a request that is refused.
 type Refusal = Box<Response<Body>>;
 
-/// A call, for the layer that turns its messages.
+/// A call, for the layer that converts its messages.
 #[derive(Clone, Debug)]
 pub(super) struct Call {
     pub format: Format,
@@ -43,7 +43,7 @@ pub(super) fn format(headers: &HeaderMap) -> Option<Format> {
     Format::of(headers.get(header::CONTENT_TYPE)?.to_str().ok()?)
 }
 
-/// Turns the headers of a request into gRPC's.
+/// Converts the headers of a request to gRPC's.
 ///
 /// # Errors
 /// The answer to a request that is refused.

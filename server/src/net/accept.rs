@@ -7,7 +7,7 @@ use tokio_util::{sync::CancellationToken, task::TaskTracker};
 
 use super::{
     connections::Connections,
-    serving::{Service, Serving},
+    serving::{ConnectionServer, Service},
 };
 use crate::{
     client::Client,
@@ -25,7 +25,7 @@ const MAX_PAUSE: Duration = Duration::from_millis(500);
 pub(crate) async fn accept<S: Service>(
     mut listeners: Vec<Listener>,
     connections: Arc<Connections>,
-    serving: Serving<S>,
+    server: ConnectionServer<S>,
     stop: CancellationToken,
 ) {
     let tasks = TaskTracker::new();

@@ -40,10 +40,10 @@ const CONTINUATION: u8 = 9;
 
 /// What a client may still send.
 #[derive(Debug)]
-pub(super) struct FrameBudget(Mutex<Saved>);
+pub(super) struct FrameBudget(Mutex<SavedFrames>);
 
 #[derive(Debug)]
-struct Saved {
+struct SavedFrames {
     frames: u64,
     /// When time was last counted.
     at: Instant,
@@ -51,7 +51,7 @@ struct Saved {
 
 impl FrameBudget {
     pub(super) fn new() -> Self {
-        Self(Mutex::new(Saved {
+        Self(Mutex::new(SavedFrames {
             frames: MAX_SAVED,
             at: Instant::now(),
         }))
@@ -83,7 +83,7 @@ impl FrameBudget {
     }
 }
 
-impl Saved {
+impl SavedFrames {
     fn grow(&mut self, now: Instant) {
         const FRAME: Duration = Duration::from_micros(1_000_000 / PER_SECOND);
         let grown = now.saturating_duration_since(self.at).as_micros() / FRAME.as_micros();

@@ -42,14 +42,14 @@ const RETRY_WHEN_ANSWERED: Duration = Duration::from_millis(50);
 
 /// Why a connection is closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Closing {
+pub(super) enum CloseReason {
     Displaced,
     Stalled,
     TooManyBytes,
     Frames,
 }
 
-impl Closing {
+impl CloseReason {
     /// The names of all in metrics.
     pub(super) const NAMES: [&str; 4] = ["displaced", "stalled", "too_many_bytes", "frames"];
 
@@ -268,13 +268,13 @@ impl Reader {
     pub(super) fn spend_frames(&self, frames: u64) -> bool {
         let within = self.frames.spend(frames);
         if !within {
-            self.close(Closing::Frames);
+            self.close(CloseReason::Frames);
         }
         within
     }
 
     /// Closes the connection at once.
-    pub(super) fn close(&self, reason: Closing) {
+    pub(super) fn close(&self, reason: CloseReason) {
         self.all.closings.add(reason as usize);
         if let Some(unlogged) = self.all.warnings.pass() {
             tracing::warn!(

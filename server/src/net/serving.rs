@@ -21,7 +21,7 @@ use tonic::{Status, body::Body};
 use tower::ServiceExt as _;
 
 use super::{
-    connections::Admitted,
+    connections::ConnectionPlace,
     frames::MIN_DATA,
     reader::{Phase, Reader},
     stream::WatchedStream,
@@ -81,7 +81,7 @@ impl<S> Service for S where
 
 /// How connections are served.
 #[derive(Clone, Debug)]
-pub(crate) struct Serving<S> {
+pub(crate) struct ConnectionServer<S> {
     pub service: S,
     /// Certificates, with which connections of TCP are encrypted.
     pub tls: Option<Arc<Tls>>,
@@ -101,9 +101,9 @@ pub(crate) struct Lifetime {
     pub close: CancellationToken,
 }
 
-impl<S: Service> Serving<S> {
+impl<S: Service> ConnectionServer<S> {
     /// Serves a connection to its end.
-    pub(super) async fn serve(self, stream: Stream, place: Admitted) {
+    pub(super) async fn serve(self, stream: Stream, place: ConnectionPlace) {
         let Self {
             service,
             tls,

@@ -90,7 +90,7 @@ const CAPACITY: usize = 16;
 
 /// A scaled hand, with its original and the hundredths of its scale.
 #[derive(Debug)]
-struct Scaled {
+struct ScaledHand {
     of: Arc<Hand>,
     hundredths: u16,
     hand: Arc<Hand>,
@@ -98,7 +98,7 @@ struct Scaled {
 
 /// The hands that were requested last, the oldest first.
 #[derive(Debug, Default)]
-struct ScaledHands(Mutex<VecDeque<Scaled>>);
+struct ScaledHands(Mutex<VecDeque<ScaledHand>>);
 
 impl ScaledHands {
     /// A hand of another size.
@@ -116,7 +116,7 @@ impl ScaledHands {
                 rig: PreparedRig::new(hand.hand.rig.scaled(scale)),
                 skin: Arc::clone(&hand.hand.skin),
             };
-            Scaled {
+            ScaledHand {
                 of: Arc::clone(&hand.hand),
                 hundredths,
                 hand: Arc::new(scaled),

@@ -28,7 +28,7 @@ use object_store::{
 
 use self::lease::Lease;
 pub(crate) use self::records::{
-    FieldMove, NotCreated, Records, Unreadable, field, is_decodable, message, move_fields, seal,
+    CreateFailure, FieldMove, Records, Unreadable, field, is_decodable, message, move_fields, seal,
 };
 use crate::error::ServiceError;
 

@@ -25,7 +25,7 @@ use crate::{
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
     config::{Config, StorePlace},
-    connect::{Connect, Transcoding},
+    connect::{Connect, Transcoder},
     error::Limit,
     executor::SearchExecutor,
     faults::FaultPoint,
@@ -33,7 +33,7 @@ use crate::{
     listen::Listener,
     middleware::Around,
     monitor::{Monitor, Phase, Vitals, set_health},
-    net::{Connections, Lifetime, Serving, UnreadCount, accept},
+    net::{ConnectionServer, Connections, Lifetime, UnreadCount, accept},
     objects::{
         derived::Resizer,
         directory::{self, DirectoryError},
@@ -386,14 +386,14 @@ impl Server {
             .layer(Around(calls(
                 &handler, &door, builds, &packers, &traces, &drained,
             )))
-            .layer(Around(Transcoding {
+            .layer(Around(Transcoder {
                 largest_upload,
                 places: packers,
             }))
             .service(routes);
         let server = ConnectionServer {
             service,
-            tls: tls.clone(),
+            tls,
             lifetime: Lifetime {
                 idle: config.connection_idle,
                 age: config.connection_age,
@@ -401,7 +401,7 @@ impl Server {
                 close: close.clone(),
             },
         };
-        let serving = accept(listeners, Arc::clone(&handler.connections), serving, stop.clone());
+        let serving = accept(listeners, Arc::clone(&handler.connections), server, stop.clone());
 
         // Stops all tasks, however this function ends.
         let _builders_end = handler.atlases.stopper();

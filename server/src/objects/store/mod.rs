@@ -226,7 +226,7 @@ impl ObjectStore {
         let mut ids = self.ids();
         ids.push(object.id.clone());
         let created = wait_for(saved.create(&record, mesh, ids));
-        if let Err(NotCreated { is_undone }) = created {
+        if let Err(CreateFailure { is_undone }) = created {
             if is_undone {
                 self.forget_mesh(mesh_uses, &hash);
             }
