@@ -18,7 +18,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_proto::v1;
+use grasp_proto::{code_name, v1};
 use http::{HeaderMap, HeaderValue, Response};
 use tokio::sync::watch;
 use tonic::{Code, body::Body};
@@ -365,7 +365,7 @@ impl Drop for OpenCall {
         if self.traces.are_on() {
             self.trace(code);
         }
-        let (status, total_us) = (grpc_name(code), micros(total));
+        let (status, total_us) = (code_name(code), micros(total));
         macro_rules! log {
             ($level:ident) => {
                 tracing::$level!(
@@ -396,18 +396,6 @@ fn micros(duration: Duration) -> u64 {
     u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
 }
 
-/// A code in the spelling of gRPC: `INVALID_ARGUMENT`.
-fn grpc_name(code: Code) -> String {
-    let mut name = String::new();
-    for character in format!("{code:?}").chars() {
-        if !name.is_empty() && character.is_ascii_uppercase() {
-            name.push('_');
-        }
-        name.push(character.to_ascii_uppercase());
-    }
-    name
-}
-
 /// A call ends with the body of its answer.
 impl FrameFilter for OpenCall {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
@@ -422,16 +410,5 @@ impl FrameFilter for OpenCall {
             self.read_status(trailers);
         }
         polled
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn status_codes_are_spelled_as_in_grpc() {
-        assert_eq!(grpc_name(Code::InvalidArgument), "INVALID_ARGUMENT");
-        assert_eq!(grpc_name(Code::Ok), "OK");
     }
 }
