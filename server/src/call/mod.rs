@@ -39,6 +39,7 @@ use crate::{
     limits::locked,
     metrics::{Method, Metrics},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+    net::Reader,
     traces::{CallTrace, Interval, Traces},
 };
 
@@ -221,8 +222,9 @@ struct OpenCall {
     method: Method,
     path: Cow<'static, str>,
     context: CallContext,
-    /// `None` is logged as cancelled.
+    /// `None` of one that is cancelled, or lost with its connection.
     code: Option<Code>,
+    reader: Option<Arc<Reader>>,
     reserve: Arc<DeadlineReserve>,
     traces: Traces,
     transport: Transport,
@@ -246,6 +248,7 @@ impl OpenCall {
     fn new(
         path: &str,
         context: CallContext,
+        reader: Option<Arc<Reader>>,
         in_flight: &watch::Sender<()>,
         reserve: &Arc<DeadlineReserve>,
         traces: &Traces,
@@ -260,6 +263,7 @@ impl OpenCall {
                 .map_or_else(|| Cow::Owned(clipped()), Cow::Borrowed),
             context,
             code: None,
+            reader,
             reserve: Arc::clone(reserve),
             traces: traces.clone(),
             transport: Transport::Waits,
@@ -353,7 +357,15 @@ impl Drop for OpenCall {
         self.answered();
         let record = &self.context.record;
         let search = record.search.get();
-        let code = self.code.unwrap_or(Code::Cancelled);
+        // A connection that the server closes is unavailable to its client.
+        let code = self.code.unwrap_or_else(|| {
+            let is_cut_off = self.reader.as_ref().is_some_and(|reader| reader.is_closing());
+            if is_cut_off {
+                Code::Unavailable
+            } else {
+                Code::Cancelled
+            }
+        });
         let total = self.context.arrived.elapsed();
         let metrics = &self.context.metrics;
         metrics.call_ended(self.method, code, total);

@@ -288,7 +288,7 @@ impl Reader {
         self.cut_off.cancel();
     }
 
-    pub(super) fn is_closing(&self) -> bool {
+    pub(crate) fn is_closing(&self) -> bool {
         self.cut_off.is_cancelled()
     }
 
