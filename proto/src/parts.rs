@@ -85,7 +85,7 @@ fn count(mut message: &[u8], fields: Option<&HashMap<u32, String>>, left: &mut u
                 }
                 length
             }
-            // Of unknown fields only: what is inside counts as outside.
+            // Of unknown fields only: their content counts as outside.
             WireType::StartGroup | WireType::EndGroup => 0,
         };
         message = message.get(skipped..)?;
@@ -121,7 +121,7 @@ mod tests {
         assert!(is_refused(&request(most, vec![0])));
         // Bytes that would be as many empty messages.
         assert!(!is_refused(&request(1, b"\x3a\0".repeat(MAX_PARTS))));
-        // What decoding refuses in the end has been counted before.
+        // Parts count even if decoding fails after them.
         let cut = request(most + 10, Vec::new());
         assert!(is_refused(&[&cut[..cut.len() - 1], &[0xff; 11]].concat()));
     }

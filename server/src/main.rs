@@ -252,7 +252,7 @@ struct ConfigReloader<'f> {
 type LogFilter = reload::Handle<Targets, Registry>;
 
 impl ConfigReloader<'_> {
-    /// Applies what may change while the server runs, and logs what came of it.
+    /// Applies changes that a running server can make, and logs the result.
     fn reload(&mut self) {
         let read = configuration(self.flags);
         let Ok((values, config)) = read.inspect_err(|error| {

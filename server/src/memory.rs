@@ -78,9 +78,7 @@ fn reserved_limits() -> Vec<MemoryLimit> {
     limits.into_iter().filter_map(limit).collect()
 }
 
-/// The limits of the process' control group and of those above it, for `/proc/self/cgroup` with lines such as `4:memory:/path`
-/// (version 1) or `0::/path` (version 2). In a container, whose root is its own group, the path may be that of the host; the root has
-/// the limit then.
+/// The limits of the process' control group and of those above it, by lines such as `4:memory:/path` or `0::/path`.
 fn cgroup_limits(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Vec<MemoryLimit> {
     let mut limits = Vec::new();
     for line in groups.lines() {
@@ -95,6 +93,7 @@ fn cgroup_limits(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Vec<Me
             }
             _ => continue,
         };
+        // In a container, the path may be that of the host; the root has the limit then.
         for group in Path::new(group.trim_start_matches('/')).ancestors() {
             let file = Path::new(mount).join(group).join(name);
             let bytes = read(&file).and_then(|text| text.trim().parse().ok());

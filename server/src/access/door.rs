@@ -32,7 +32,7 @@ pub(crate) struct Door {
     rates: Mutex<HashMap<Arc<str>, Rate>>,
 }
 
-/// What a method needs.
+/// The scope that a method needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Need {
     /// Nothing: probes know no secrets.
@@ -142,7 +142,7 @@ impl Reloadable for Door {
         self.file.as_deref().into_iter().collect()
     }
 
-    /// Calls from now on are judged by what is read; running ones go on.
+    /// Calls from now on are judged by the new tokens; running ones go on.
     fn reload(&self) -> Result<(), Vec<String>> {
         if let Some(file) = &self.file {
             let tokens = Arc::new(Tokens::read(file, &self.tokens())?);

@@ -1,7 +1,7 @@
-//! Who may call: clients that tokens or certificates name, what each may do, and what belongs to whom.
+//! Who may call: clients that tokens or certificates name, with their rights and belongings.
 //!
-//! [`Door`] lets a call in, or refuses it before its message is read. It makes the call's [`Caller`], who is the [`Owner`] of what the
-//! call creates. Without tokens and certificates, anyone may do anything, and everything is everybody's.
+//! [`Door`] lets a call in, or refuses it before its message is read. It makes the call's [`Caller`], who is the [`Owner`] of objects
+//! and rigs that the call creates. Without tokens and certificates, anyone may do anything, and everything is everybody's.
 
 mod door;
 mod tokens;
@@ -31,7 +31,7 @@ pub(crate) struct Caller(Option<Arc<Identity>>);
 pub(crate) struct Identity {
     pub name: Arc<str>,
     pub scopes: Vec<Scope>,
-    /// True if what it creates is everybody's.
+    /// True if its creations are everybody's.
     pub shared: bool,
     pub quotas: Quotas,
     /// Number of its searches, running and waiting, if it has a quota of them.
@@ -60,7 +60,7 @@ impl Drop for QuotaSearch {
     }
 }
 
-/// What a call does; a client may make calls of some kinds only.
+/// The kind of a call; a client may make calls of some kinds only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Scope {
@@ -113,7 +113,7 @@ impl Caller {
         self.0.as_ref().map(|identity| &identity.name)
     }
 
-    /// The owner of what the caller creates.
+    /// The owner of the caller's creations.
     pub(crate) fn owner(&self) -> Owner {
         let owner = self.0.as_ref().filter(|identity| !identity.shared);
         Owner(owner.map(|identity| Arc::clone(&identity.name)))

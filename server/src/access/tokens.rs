@@ -1,4 +1,4 @@
-//! The file of tokens: each client's name, the hashes of its secrets, and what it may do.
+//! The file of tokens: each client's name, the hashes of its secrets, and its rights.
 
 use std::{collections::BTreeMap, fs, num::NonZeroU32, path::Path, sync::Arc};
 
@@ -30,7 +30,7 @@ pub(super) const CERTIFICATE: &str = "cert:";
 
 type Hash = [u8; 32];
 
-/// What a client may use of the server at most; absent ones are bounded by the server's limits only.
+/// Bounds on a client's use of the server; absent ones are the server's own limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Quotas {
     /// Calls per second, over a second.

@@ -214,9 +214,6 @@ fn code_in(headers: &HeaderMap) -> Option<Code> {
 }
 
 /// A call from its arrival to the end of its answer, when it is logged.
-///
-/// It measures for how long the transport waits for parts of the answer after the end of the call's search. Nothing counts while the
-/// client does not read. A client drops the call at its deadline: the answer would have taken at least until then.
 #[derive(Debug)]
 struct OpenCall {
     method: Method,
@@ -228,7 +225,8 @@ struct OpenCall {
     reserve: Arc<DeadlineReserve>,
     traces: Traces,
     transport: Transport,
-    /// How long the transport has waited for parts of the answer since the end of the search.
+    /// How long the transport has waited for parts of the answer since the end of the search. Nothing counts while the client does not
+    /// read; one that drops the call at its deadline would have waited at least until then.
     waited: Duration,
     _in_flight: watch::Receiver<()>,
 }

@@ -41,8 +41,7 @@ const LARGE: usize = 32 << 10;
 /// Bytes of JSON per byte of protobuf, for messages of numbers.
 const JSON_GROWTH: usize = 5;
 
-/// Bytes of protobuf, besides the mesh, that a value in JSON takes at least on average. Values are kept in tens of bytes each while
-/// they are converted.
+/// Least bytes of protobuf per value in JSON, on average and besides the mesh; values take tens of bytes while they are converted.
 const BYTES_OF_VALUE: usize = 2;
 
 /// The layer inside that of calls; see the module documentation.
@@ -166,7 +165,7 @@ struct MessageLimits {
 struct Reader {
     call: Call,
     limits: MessageLimits,
-    /// What has arrived of the next message, and perhaps of others.
+    /// The bytes of the next message that have arrived, and perhaps of others.
     buffer: BytesMut,
     /// The request has arrived to its end.
     ended: bool,

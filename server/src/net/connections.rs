@@ -90,8 +90,7 @@ impl Open {
         Some(reader)
     }
 
-    /// Closes a connection, of this client or any, to make room: the one that has waited longest for the rest of its preface, or else
-    /// longest for a call, and for this time at least. False if there is none.
+    /// Closes the connection, of this client or any, that is longest without its preface, or else without a call for this time.
     fn evict(&mut self, of: Option<&Client>, idle: Duration) -> bool {
         let waiting = self.readers.iter().filter_map(|(&number, reader)| {
             let is_of = of.is_none_or(|client| reader.client == *client);

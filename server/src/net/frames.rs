@@ -38,7 +38,7 @@ const DATA: u8 = 0;
 const HEADERS: u8 = 1;
 const CONTINUATION: u8 = 9;
 
-/// What a client may still send.
+/// The frames that a client may still send.
 #[derive(Debug)]
 pub(super) struct FrameBudget(Mutex<SavedFrames>);
 
@@ -99,7 +99,7 @@ impl SavedFrames {
 /// Follows the frames of a connection, whose bytes arrive in pieces of any size.
 #[derive(Debug, Default)]
 pub(super) struct FrameCount {
-    /// What has arrived of a frame's header.
+    /// The bytes of a frame's header that have arrived.
     header: [u8; FRAME_HEADER],
     arrived: usize,
     /// Bytes that are missing of the frame after its header.

@@ -65,7 +65,7 @@ impl CloseReason {
     }
 }
 
-/// A connection's client, and what waits on it. Times are in milliseconds since the start of [`Connections`].
+/// A connection's client, and the bytes that wait on it. Times are in milliseconds since the start of [`Connections`].
 #[derive(Debug)]
 pub(crate) struct Reader {
     pub(super) all: Arc<Connections>,
@@ -90,7 +90,7 @@ pub(crate) struct Reader {
     cut_off: CancellationToken,
 }
 
-/// What a connection does.
+/// The activity of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
     /// Its client has not sent all of HTTP/2's preface, or as many bytes of a request.
@@ -198,7 +198,7 @@ impl Reader {
         }
     }
 
-    /// What is left of a time that began then.
+    /// The rest of a time that began then.
     pub(super) fn left(&self, since: u64, time: Duration) -> Duration {
         time.saturating_sub(Duration::from_millis(self.all.now().saturating_sub(since)))
     }

@@ -157,8 +157,7 @@ impl<S: Service> ConnectionServer<S> {
 }
 
 impl Lifetime {
-    /// Waits until the connection should take no more calls: it is old, has had none for too long, or its client does not send its
-    /// preface; or the server stops.
+    /// Waits until the connection should take no more calls: it is old, idle or without its preface for too long, or the server stops.
     async fn until_leaving(&self, reader: &Reader) {
         // Connections that began together do not end together.
         let old = Instant::now() + self.age.mul_f64(0.9 + 0.2 * random_fraction());

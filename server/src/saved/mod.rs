@@ -253,8 +253,7 @@ struct OwnedFolder {
 }
 
 impl OwnedFolder {
-    /// Creates the folder with these subfolders if necessary, takes it, and removes unfinished files. An error if it
-    /// lacks a subfolder that it had, or if another server uses it.
+    /// Takes the folder, which is created if necessary and must have the subfolders that it had, and removes unfinished files.
     fn open(path: &Path, subfolders: &[&str]) -> io::Result<Self> {
         let is_new = !path.join(LOCK).exists();
         let missing = |subfolder: &&str| !is_new && !path.join(subfolder).is_dir();

@@ -67,7 +67,7 @@ impl Tls {
         })
     }
 
-    /// What a new connection uses.
+    /// The settings of a new connection.
     pub(crate) fn config(&self) -> Arc<ServerConfig> {
         self.current().config
     }
@@ -92,7 +92,7 @@ impl Reloadable for Tls {
         required.into_iter().chain(files.client_ca.as_deref()).collect()
     }
 
-    /// Connections from now on use what is read.
+    /// Connections from now on use the new certificates.
     fn reload(&self) -> Result<(), Vec<String>> {
         let loaded = load(&self.files)?;
         *self.current.write().unwrap_or_else(PoisonError::into_inner) = loaded;
