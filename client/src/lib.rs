@@ -45,11 +45,11 @@ mod retry;
 mod streams;
 
 pub use client::{GraspClient, GraspClientBuilder, Health};
-pub use error::{BoxError, CallError, ClientError, code_name};
+pub use error::{BoxError, CallError, ClientError};
 #[cfg(feature = "json")]
 pub use grasp_proto::json;
 pub use grasp_proto::{
-    JOINT_COUNT, std_duration,
+    JOINT_COUNT, code_name, std_duration,
     v1::{
         self, Check, Convention, CurrentGraspStatus, Digit, GraspChoice, GraspSource, GraspType, Handedness,
         Outcome, Preference, Strategy,

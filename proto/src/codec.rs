@@ -11,10 +11,7 @@ use tonic::{
     codec::{Codec, DecodeBuf, Decoder, EncodeBuf, Encoder},
 };
 
-use crate::parts::{MAX_PARTS, has_too_many_parts};
-
-/// End of the names of requests.
-const REQUEST: &str = "Request";
+use crate::parts::{MAX_PARTS, has_too_many_parts, is_request};
 
 /// Encodes the same bytes as `tonic_prost::ProstCodec`, but from and into plain slices: prost accesses its buffer once
 /// per number, and with gRPC's buffers each access costs more than the number itself. Requests of more than [`MAX_PARTS`] parts are
@@ -66,7 +63,7 @@ impl<T, U: Message + Name + Default> Decoder for SliceCodec<T, U> {
 
     fn decode(&mut self, buffer: &mut DecodeBuf<'_>) -> Result<Option<U>, Status> {
         let bytes = buffer.copy_to_bytes(buffer.remaining());
-        if U::NAME.ends_with(REQUEST) && has_too_many_parts::<U>(&bytes) {
+        if is_request::<U>() && has_too_many_parts::<U>(&bytes) {
             let problem = format!("it has more than {MAX_PARTS} messages, texts and lists");
             return Err(Status::internal(problem));
         }

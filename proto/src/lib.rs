@@ -11,7 +11,7 @@ mod values;
 
 pub use packed::PackedGraspError;
 pub use parts::{MAX_PARTS, has_too_many_parts};
-pub use values::{JOINT_COUNT, std_duration, wire_duration};
+pub use values::{JOINT_COUNT, code_name, std_duration, wire_duration};
 
 /// Messages, clients and servers of package `grasp.v1`.
 #[allow(missing_docs, clippy::large_enum_variant, clippy::pedantic, unreachable_pub)]

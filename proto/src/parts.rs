@@ -1,6 +1,9 @@
 //! Counts the parts of an encoded message before it is decoded: one of two bytes may take hundreds in memory.
 
-use std::{collections::HashMap, sync::LazyLock};
+use std::{
+    collections::{HashMap, HashSet},
+    sync::LazyLock,
+};
 
 use prost::{
     Message as _, Name,
@@ -16,15 +19,32 @@ pub const MAX_PARTS: usize = 16_384;
 
 /// The contract's messages: which of a message's fields are messages, and which ones. None is inside itself, which bounds the nesting.
 static MESSAGES: LazyLock<HashMap<String, HashMap<u32, String>>> = LazyLock::new(|| {
-    let files = FileDescriptorSet::decode(FILE_DESCRIPTOR_SET).expect("the compiled contract is sound");
     let mut messages = HashMap::new();
-    for file in &files.file {
+    for file in &files().file {
         for message in &file.message_type {
             add(&mut messages, file.package(), message);
         }
     }
     messages
 });
+
+/// The messages that methods take; not all of them have names that say so.
+static REQUESTS: LazyLock<HashSet<String>> = LazyLock::new(|| {
+    let files = files();
+    let services = files.file.iter().flat_map(|file| &file.service);
+    let methods = services.flat_map(|service| &service.method);
+    let inputs = methods.map(|method| method.input_type().trim_start_matches('.').to_owned());
+    inputs.collect()
+});
+
+fn files() -> FileDescriptorSet {
+    FileDescriptorSet::decode(FILE_DESCRIPTOR_SET).expect("the compiled contract is sound")
+}
+
+/// True if a method takes this message.
+pub(crate) fn is_request<M: Name>() -> bool {
+    REQUESTS.contains(&M::full_name())
+}
 
 fn add(messages: &mut HashMap<String, HashMap<u32, String>>, scope: &str, message: &DescriptorProto) {
     let name = format!("{scope}.{}", message.name());
@@ -65,7 +85,7 @@ fn count(mut message: &[u8], fields: Option<&HashMap<u32, String>>, left: &mut u
                 }
                 length
             }
-            // Of unknown fields only: what is inside counts as outside.
+            // Of unknown fields only: their content counts as outside.
             WireType::StartGroup | WireType::EndGroup => 0,
         };
         message = message.get(skipped..)?;
@@ -101,21 +121,21 @@ mod tests {
         assert!(is_refused(&request(most, vec![0])));
         // Bytes that would be as many empty messages.
         assert!(!is_refused(&request(1, b"\x3a\0".repeat(MAX_PARTS))));
-        // What decoding refuses in the end has been counted before.
+        // Parts count even if decoding fails after them.
         let cut = request(most + 10, Vec::new());
         assert!(is_refused(&[&cut[..cut.len() - 1], &[0xff; 11]].concat()));
     }
+
     #[test]
     fn no_request_has_a_message_inside_itself() {
         fn depth(message: &str) -> usize {
             let inner = MESSAGES.get(message).into_iter().flat_map(HashMap::values);
             1 + inner.map(|inner| depth(inner)).max().unwrap_or(0)
         }
-        let requests = MESSAGES
-            .keys()
-            .filter(|name| name.starts_with("grasp.v1.") && name.ends_with("Request"));
+        assert!(is_request::<v1::Track>() && is_request::<v1::FindGraspRequest>());
+        assert!(!is_request::<v1::FindGraspResponse>());
         // A cycle would end in a stack overflow.
-        let deepest = requests.map(|name| depth(name)).max();
+        let deepest = REQUESTS.iter().map(|name| depth(name)).max();
         assert!(deepest > Some(4), "{deepest:?}");
     }
 }

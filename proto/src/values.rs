@@ -1,12 +1,37 @@
-//! Values of messages: numbers, poses, hands and parts of space.
+//! Values of messages: numbers, poses, hands and parts of space; and the names of codes.
 //!
 //! Methods named after a field return its meaning: an absent position is the origin, for instance.
 
 use std::{ops::Mul, time::Duration};
 
 use glam::{Quat, Vec3};
+use tonic::Code;
 
 use crate::v1::{self, presenting_hand::Form, shape::Kind};
+
+/// The name of a code as the gRPC specification writes it, such as `INVALID_ARGUMENT`.
+#[must_use]
+pub fn code_name(code: Code) -> &'static str {
+    match code {
+        Code::Ok => "OK",
+        Code::Cancelled => "CANCELLED",
+        Code::Unknown => "UNKNOWN",
+        Code::InvalidArgument => "INVALID_ARGUMENT",
+        Code::DeadlineExceeded => "DEADLINE_EXCEEDED",
+        Code::NotFound => "NOT_FOUND",
+        Code::AlreadyExists => "ALREADY_EXISTS",
+        Code::PermissionDenied => "PERMISSION_DENIED",
+        Code::ResourceExhausted => "RESOURCE_EXHAUSTED",
+        Code::FailedPrecondition => "FAILED_PRECONDITION",
+        Code::Aborted => "ABORTED",
+        Code::OutOfRange => "OUT_OF_RANGE",
+        Code::Unimplemented => "UNIMPLEMENTED",
+        Code::Internal => "INTERNAL",
+        Code::Unavailable => "UNAVAILABLE",
+        Code::DataLoss => "DATA_LOSS",
+        Code::Unauthenticated => "UNAUTHENTICATED",
+    }
+}
 
 /// A duration of a message. Negative ones, which no sound message has, are 0.
 #[must_use]

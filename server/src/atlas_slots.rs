@@ -1,12 +1,14 @@
 //! Atlas slots: one object's atlases, one slot per hand, and the demand for each.
 
 use std::{
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard},
     time::Duration,
 };
 
 use grasp_assets::hands::Hand;
 use grasp_synthesis::known::{atlas::Atlas, growth::Grown};
+
+use crate::limits::locked;
 
 /// Time after which a call counts half.
 const HALF_LIFE: Duration = Duration::from_mins(5);
@@ -189,8 +191,7 @@ impl AtlasSlots {
     }
 
     fn lock(&self) -> MutexGuard<'_, Vec<(Arc<Hand>, Slot)>> {
-        // No code panics while it holds the lock; if some did, the slots would still be consistent.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0)
     }
 }
 

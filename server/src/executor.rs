@@ -17,9 +17,10 @@ use futures_util::FutureExt as _;
 use grasp_admission::{Gate, Job, TooLate};
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::{OwnedSemaphorePermit, oneshot};
+use tokio::sync::oneshot;
 
 use crate::{
+    access::QuotaSearch,
     client::Client,
     error::{Limit, ServiceError},
     faults::{FaultPoint, Faults},
@@ -73,12 +74,12 @@ pub(crate) struct Admission {
     queue_time: Arc<QueueTime>,
     _place: Place,
     /// Of the client's own quota.
-    _own: Option<OwnedSemaphorePermit>,
+    _own: Option<QuotaSearch>,
 }
 
 impl Admission {
     /// The same within a client's quota.
-    pub(crate) fn within(self, own: Option<OwnedSemaphorePermit>) -> Self {
+    pub(crate) fn within(self, own: Option<QuotaSearch>) -> Self {
         Self { _own: own, ..self }
     }
 
@@ -131,9 +132,9 @@ impl Workers<'_> {
 }
 
 /// Cancels a job when its call is dropped.
-struct Waiting(Arc<Job<Client>>);
+struct CancelGuard(Arc<Job<Client>>);
 
-impl Drop for Waiting {
+impl Drop for CancelGuard {
     fn drop(&mut self) {
         self.0.cancel();
     }
@@ -187,7 +188,7 @@ impl SearchExecutor {
     ) -> Result<T, ServiceError> {
         let pool = Arc::clone(&self.pool);
         let (faults, queue) = (self.faults.clone(), Arc::clone(&self.queue));
-        let _waiting = Waiting(Arc::clone(&admission.job));
+        let _waiting = CancelGuard(Arc::clone(&admission.job));
         run_blocking(move || {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
             let admission = admission;

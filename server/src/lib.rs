@@ -1,16 +1,17 @@
 //! The service that answers grasp requests, over gRPC, gRPC-Web and Connect.
 //!
-//! [`run`] serves on a listener, and [`Server::serve`] on several, until it is shut down; the binary `grasp-server` adds flags, logs and signals.
+//! [`run`] serves on a listener, and [`Server::serve`] on several, until it is shut down; the binary `grasp-server` adds flags, logs and
+//! signals.
 //!
-//! A request passes these modules: `call` records its arrival and deadline, and `access` lets it in or refuses it; `services` handles it; `validate` turns the message
-//! into checked values or a list of all errors; `objects` finds the object with its search structures, `rigs` the hands, and
-//! `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and stops it when the call is
-//! dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages go through
-//! `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next. `budget` says how long a search
-//! may take, and how much of a deadline recent delays leave for it. `limits` shares places between clients, which `client` tells apart.
+//! A request passes these modules: `call` records its arrival and deadline; `access` lets it in or refuses it; `services` handles it;
+//! `validate` turns the message into checked values or a list of all errors; `objects` finds the object with its search structures,
+//! `rigs` the hands, and `atlases` the grips known for it; `executor` admits the search, runs it on its own threads, and stops it when
+//! the call is dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages go through
+//! `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next. `budget` says how long a search may
+//! take, and how much of a deadline recent delays leave for it. `limits` shares places between clients, which `client` tells apart.
 //!
 //! `wire` converts single values of the contract, `middleware` is the form of layers around services. `web` lets pages in browsers
-//! call, and refuses pages of other origins and protocols other than gRPC, gRPC-Web and Connect, which `connect` turns into gRPC.
+//! call, and refuses pages of other origins and protocols other than gRPC, gRPC-Web and Connect, which `connect` converts to gRPC.
 //! `listen` has the addresses and sockets on which the server listens, `tls` encrypts connections, and `reload` reads changed files
 //! again.
 //!
@@ -31,8 +32,8 @@
 //! ```text
 //! budget  client  convention  error  faults  methods  middleware  reload  warning_rate  wire
 //! limits  listen  log_lines  metrics  tls  traces  viewer
-//! access  atlas_slots  executor  health_check  net  saved  web
-//! rigs
+//! access  atlas_slots  health_check  net  saved  web
+//! executor  rigs
 //! answer  call  config  validate
 //! connect  memory  objects  open_files  track
 //! atlases

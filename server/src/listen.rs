@@ -8,6 +8,7 @@ use std::{
     str::FromStr,
 };
 
+use rustix::io::Errno;
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 use tokio_util::either::Either;
 
@@ -19,8 +20,8 @@ pub(crate) const NEEDED_LISTEN: &str = "an address like [::1]:50051, or unix:/PA
 /// Port of the default address.
 const DEFAULT_PORT: u16 = 50051;
 
-/// Codes of the errors that say that the machine has no IPv6, or not on this interface.
-const NO_IPV6: [i32; 2] = [97, 99];
+/// The errors that say that the machine has no IPv6, or not on this interface.
+const NO_IPV6: [Errno; 2] = [Errno::AFNOSUPPORT, Errno::ADDRNOTAVAIL];
 
 const UNIX: &str = "unix:";
 
@@ -47,9 +48,7 @@ impl ListenAddress {
         Ipv4Addr::LOCALHOST,
         DEFAULT_PORT,
     )));
-}
 
-impl ListenAddress {
     /// True if only processes of this machine can reach it.
     pub(crate) fn is_private(&self) -> bool {
         match self {
@@ -109,7 +108,8 @@ impl Listener {
             match Self::bind(address).await {
                 Ok(listener) => listeners.push(listener),
                 Err(error)
-                    if is_default && error.raw_os_error().is_some_and(|code| NO_IPV6.contains(&code)) =>
+                    if is_default
+                        && Errno::from_io_error(&error).is_some_and(|code| NO_IPV6.contains(&code)) =>
                 {
                     tracing::warn!(%error, "this machine has no IPv6; listening on 127.0.0.1 instead");
                 }

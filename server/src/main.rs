@@ -124,12 +124,12 @@ fn start(flags: &Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
     }
     fit_open_files(&mut config);
     let json = config.log_format == LogFormat::Json;
-    let rereading = Rereading {
+    let config_reloader = ConfigReloader {
         flags,
         values,
         log_filter,
     };
-    match run(&config, rereading) {
+    match run(&config, config_reloader) {
         Ok(()) => Ok(ExitCode::SUCCESS),
         // Readers of a JSON log need the reason there, too.
         Err(error) if json && tracing::enabled!(tracing::Level::ERROR) => {
@@ -151,7 +151,7 @@ fn print_descriptor_set() -> Result<(), Box<dyn std::error::Error>> {
     Ok(output.flush()?)
 }
 
-fn run(config: &Config, rereading: Rereading<'_>) -> Result<(), Box<dyn std::error::Error>> {
+fn run(config: &Config, config_reloader: ConfigReloader<'_>) -> Result<(), Box<dyn std::error::Error>> {
     let variables = env::vars_os().filter_map(|(name, _)| name.into_string().ok());
     let flags = Flags::command();
     let known = flags.get_arguments().filter_map(|argument| argument.get_env());
@@ -171,7 +171,7 @@ fn run(config: &Config, rereading: Rereading<'_>) -> Result<(), Box<dyn std::err
         .max_blocking_threads(config.blocking_threads())
         .enable_all()
         .build()?;
-    let result = runtime.block_on(serve(config, server, rereading));
+    let result = runtime.block_on(serve(config, server, config_reloader));
     runtime.shutdown_timeout(RUNTIME_END);
     result
 }
@@ -179,7 +179,7 @@ fn run(config: &Config, rereading: Rereading<'_>) -> Result<(), Box<dyn std::err
 async fn serve(
     config: &Config,
     server: Server,
-    mut rereading: Rereading<'_>,
+    mut config_reloader: ConfigReloader<'_>,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let listeners = Listener::bind_all(&config.listen).await;
     let listeners = listeners.map_err(|(address, error)| format!("cannot listen on {address}: {error}"))?;
@@ -204,7 +204,7 @@ async fn serve(
                         if has_terminal {
                             break;
                         }
-                        rereading.reread();
+                        config_reloader.reload();
                         reloader.reload();
                     }
                 }
@@ -242,7 +242,7 @@ async fn serve(
 }
 
 /// Reads the configuration of a running server again.
-struct Rereading<'f> {
+struct ConfigReloader<'f> {
     flags: &'f Flags,
     /// The values in force.
     values: RawConfig,
@@ -251,9 +251,9 @@ struct Rereading<'f> {
 
 type LogFilter = reload::Handle<Targets, Registry>;
 
-impl Rereading<'_> {
-    /// Applies what may change while the server runs, and logs what came of it.
-    fn reread(&mut self) {
+impl ConfigReloader<'_> {
+    /// Applies changes that a running server can make, and logs the result.
+    fn reload(&mut self) {
         let read = configuration(self.flags);
         let Ok((values, config)) = read.inspect_err(|error| {
             tracing::error!(%error, "the configuration stays as it was");

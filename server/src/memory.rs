@@ -3,10 +3,11 @@
 //! The limits are kept while the server runs: caches evict, and calls beyond them are refused. All other memory is small or
 //! short-lived: threads, connections, and the working memory of searches and readers of meshes.
 //!
-//! Limits of the process are read from files, which needs no foreign code. Where those are missing, as on systems other than Linux,
-//! none are found.
+//! Control groups are read from files. Where those are missing, as on systems other than Linux, none are found.
 
 use std::{fs, path::Path};
+
+use rustix::process::{Resource, getrlimit};
 
 use crate::{
     config::{Config, StorePlace},
@@ -17,7 +18,7 @@ use crate::{
 const UNLIMITED: u64 = 1 << 62;
 
 /// A limit on the memory of the process.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 struct MemoryLimit {
     bytes: u64,
     /// Its origin: the control group's file, or the name of the resource limit.
@@ -66,29 +67,18 @@ pub fn is_reserved_memory_limited() -> bool {
     !reserved_limits().is_empty()
 }
 
-/// The limits on reserved memory (`RLIMIT_AS`, `RLIMIT_DATA`).
+/// The limits on reserved memory.
 fn reserved_limits() -> Vec<MemoryLimit> {
-    resource_limits(&fs::read_to_string("/proc/self/limits").unwrap_or_default())
-}
-
-/// The soft limits of `/proc/self/limits`.
-fn resource_limits(text: &str) -> Vec<MemoryLimit> {
-    let limits = [
-        ("Max address space", "RLIMIT_AS"),
-        ("Max data size", "RLIMIT_DATA"),
-    ];
-    let limit = |(title, name): (&str, &str)| {
-        let line = text.lines().find_map(|line| line.strip_prefix(title))?;
-        let bytes = line.split_whitespace().next()?.parse().ok()?;
+    let limit = |(resource, name): (Resource, &str)| {
+        let bytes = getrlimit(resource).current?;
         let source = name.to_owned();
         Some(MemoryLimit { bytes, source })
     };
+    let limits = [(Resource::As, "RLIMIT_AS"), (Resource::Data, "RLIMIT_DATA")];
     limits.into_iter().filter_map(limit).collect()
 }
 
-/// The limits of the process' control group and of those above it, for `/proc/self/cgroup` with lines such as `4:memory:/path`
-/// (version 1) or `0::/path` (version 2). In a container, whose root is its own group, the path may be that of the host; the root has
-/// the limit then.
+/// The limits of the process' control group and of those above it, by lines such as `4:memory:/path` or `0::/path`.
 fn cgroup_limits(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Vec<MemoryLimit> {
     let mut limits = Vec::new();
     for line in groups.lines() {
@@ -103,6 +93,7 @@ fn cgroup_limits(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Vec<Me
             }
             _ => continue,
         };
+        // In a container, the path may be that of the host; the root has the limit then.
         for group in Path::new(group.trim_start_matches('/')).ancestors() {
             let file = Path::new(mount).join(group).join(name);
             let bytes = read(&file).and_then(|text| text.trim().parse().ok());
@@ -168,17 +159,5 @@ mod tests {
             let bytes: Vec<u64> = found.iter().map(|limit| limit.bytes).collect();
             assert_eq!(bytes, expected, "{groups}");
         }
-    }
-
-    #[test]
-    fn finds_soft_resource_limits() {
-        let text = "Limit                     Soft Limit           Hard Limit           Units     \n\
-                    Max data size             unlimited            unlimited            bytes     \n\
-                    Max address space         1073741824           unlimited            bytes     \n";
-        let limit = MemoryLimit {
-            bytes: 1 << 30,
-            source: "RLIMIT_AS".to_owned(),
-        };
-        assert_eq!(resource_limits(text), [limit]);
     }
 }

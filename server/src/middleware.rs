@@ -1,4 +1,5 @@
-//! Layers of services, each written as a function of a request and the inner service, and filters of bodies.
+//! Layers of services, each written as a function of a request and the inner service, filters of bodies, and a header that several
+//! layers read.
 
 use std::{
     future::Future,
@@ -7,10 +8,20 @@ use std::{
 };
 
 use bytes::Bytes;
-use http::{Request, Response};
+use http::{HeaderValue, Request, Response};
 use http_body::{Body as _, Frame};
 use tonic::{Status, body::Body};
 use tower::{Layer, Service};
+
+/// True if a header lists gzip among the codings that its sender takes (RFC 9110, 12.5.3).
+pub(crate) fn is_gzip_among(accepted: &HeaderValue) -> bool {
+    let codings = accepted.to_str().unwrap_or_default().split(',');
+    codings.map(str::trim).any(|coding| {
+        let (name, weight) = coding.split_once(';').unwrap_or((coding, "q=1"));
+        let weight = weight.trim().trim_start_matches("q=").parse::<f32>();
+        matches!(name.trim(), "gzip" | "*") && weight.is_ok_and(|weight| weight > 0.0)
+    })
+}
 
 pub(crate) type Answer<E> = Pin<Box<dyn Future<Output = Result<Response<Body>, E>> + Send>>;
 

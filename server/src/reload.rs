@@ -17,7 +17,7 @@ const CHECK: Duration = Duration::from_secs(2);
 /// Interval between reminders.
 const REMINDER: Duration = Duration::from_hours(24);
 
-/// What files say, and how it is read again.
+/// Settings from files that can be read again.
 pub(crate) trait Reloadable: Debug + Send + Sync {
     /// Its name in the log.
     fn subject(&self) -> &'static str;
@@ -27,7 +27,7 @@ pub(crate) trait Reloadable: Debug + Send + Sync {
     /// Reads the files. If the result is an error, which lists everything that is wrong, nothing has changed.
     fn reload(&self) -> Result<(), Vec<String>>;
 
-    /// Warns of what will be wrong with them, once they are read and every day.
+    /// Warns of coming problems with them, once they are read and every day.
     fn remind(&self) {}
 }
 
@@ -36,7 +36,7 @@ pub(crate) trait Reloadable: Debug + Send + Sync {
 pub struct Reloader(Arc<Notify>);
 
 impl Reloader {
-    /// Reads the files of certificates and tokens again, even if they have not changed. The log says what came of it.
+    /// Reads the files of certificates and tokens again, even if they have not changed. The log has the result.
     pub fn reload(&self) {
         self.0.notify_one();
     }
@@ -55,15 +55,15 @@ fn stamps(of: &dyn Reloadable) -> Stamps {
 
 /// A reloadable with the state of its files.
 #[derive(Debug)]
-pub(crate) struct Watched {
+pub(crate) struct WatchedFiles {
     source: Arc<dyn Reloadable>,
     loaded: Stamps,
     /// At the last look.
     seen: Stamps,
 }
 
-impl Watched {
-    /// Watches what was just read.
+impl WatchedFiles {
+    /// Watches files that were just read.
     pub(crate) fn new(source: Arc<dyn Reloadable>) -> Self {
         source.remind();
         let loaded = stamps(&*source);
@@ -102,8 +102,8 @@ impl Watched {
     }
 }
 
-/// Reads what changes until it is dropped.
-pub(crate) async fn keep_current(mut watched: Vec<Watched>, reloader: Reloader) {
+/// Reads changed files until it is dropped.
+pub(crate) async fn keep_current(mut watched: Vec<WatchedFiles>, reloader: Reloader) {
     let mut check = tokio::time::interval(CHECK);
     check.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut reminded = Instant::now();
@@ -128,6 +128,6 @@ pub(crate) async fn keep_current(mut watched: Vec<Watched>, reloader: Reloader) 
         let Ok(back) = looked.await else { break };
         watched = back;
     }
-    // A panic, which the log has. The server goes on with what it has read.
+    // A panic, which the log has. The server goes on with its present settings.
     std::future::pending::<()>().await;
 }

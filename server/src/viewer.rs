@@ -9,7 +9,7 @@ use http_body_util::Full;
 use sha2::{Digest as _, Sha256};
 use tonic::body::Body;
 
-use crate::middleware::{Answer, Around, Middleware};
+use crate::middleware::{Answer, Around, Middleware, is_gzip_among};
 
 static PAGE: &[u8] = include_bytes!("../../client/web/viewer/dist/index.html.gz");
 
@@ -94,15 +94,6 @@ fn lists(known: &HeaderValue, etag: &HeaderValue) -> bool {
         .split(',')
         .map(str::trim)
         .any(|tag| tag == "*" || tag.trim_start_matches("W/") == etag)
-}
-
-fn is_gzip_among(accepted: &HeaderValue) -> bool {
-    let codings = accepted.to_str().unwrap_or_default().split(',');
-    codings.map(str::trim).any(|coding| {
-        let (name, weight) = coding.split_once(';').unwrap_or((coding, "q=1"));
-        let weight = weight.trim().trim_start_matches("q=").parse::<f32>();
-        matches!(name.trim(), "gzip" | "*") && weight.is_ok_and(|weight| weight > 0.0)
-    })
 }
 
 fn unpacked() -> Vec<u8> {

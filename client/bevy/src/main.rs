@@ -25,7 +25,7 @@ const FRAME: Duration = Duration::from_millis(10);
 const RIG: &str = "bevy-hand";
 /// Largest distance in metres between the model's joints and the answer's.
 const TOLERANCE: f32 = 1e-3;
-/// What the names of a digit's nodes begin with, and its first joint as OpenXR numbers them.
+/// The start of the names of a digit's nodes, and its first joint as OpenXR numbers them.
 const DIGITS: [(&str, usize); 5] = [
     ("thumb-", 2),
     ("index-finger-", 6),

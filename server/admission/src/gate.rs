@@ -179,7 +179,7 @@ impl<C: Client> Job<C> {
         self.is_cancelled.load(Ordering::Acquire)
     }
 
-    /// Lets what it has cost count for the expectation of others.
+    /// Lets its cost count for the expectation of others.
     pub fn done(&self) {
         if let Some(job) = locked(&self.gate.0).jobs.get_mut(&self.number) {
             job.is_done = true;
@@ -214,8 +214,7 @@ mod tests {
 
     const FAR: Duration = Duration::from_hours(1);
 
-    /// Jobs of some clients take turns on threads of their own, and some are cancelled meanwhile: no more run at once than there are
-    /// turns, each ends, and nothing is left.
+    /// Jobs take turns on threads of their own, and one is cancelled: no more run than there are turns, each ends, nothing is left.
     fn jobs_take_turns() {
         let gate = Gate::new(2);
         let running = Arc::new(AtomicUsize::new(0));

@@ -30,7 +30,7 @@ mod sync {
     }
 }
 
-/// What tells clients apart.
+/// The identity of a client.
 pub trait Client: Clone + Eq + std::hash::Hash {}
 
 impl<T: Clone + Eq + std::hash::Hash> Client for T {}

@@ -27,7 +27,7 @@ pub struct Full;
 
 /// Places that are taken as long as their [`Place`] lives.
 #[derive(Debug)]
-pub struct Places<C: Client>(Arc<Shared<C>>);
+pub struct Places<C: Client>(Arc<PlacesState<C>>);
 
 impl<C: Client> Clone for Places<C> {
     fn clone(&self) -> Self {
@@ -36,13 +36,13 @@ impl<C: Client> Clone for Places<C> {
 }
 
 #[derive(Debug)]
-struct Shared<C> {
+struct PlacesState<C> {
     maximum: usize,
-    held: Mutex<Held<C>>,
+    held: Mutex<HeldPlaces<C>>,
 }
 
 #[derive(Debug)]
-struct Held<C> {
+struct HeldPlaces<C> {
     total: usize,
     /// Clients that hold places.
     by_client: HashMap<C, usize>,
@@ -59,11 +59,11 @@ pub struct Place<C: Client> {
 impl<C: Client> Places<C> {
     /// So many places, all free.
     pub fn new(maximum: usize) -> Self {
-        let held = Held {
+        let held = HeldPlaces {
             total: 0,
             by_client: HashMap::new(),
         };
-        Self(Arc::new(Shared {
+        Self(Arc::new(PlacesState {
             maximum,
             held: Mutex::new(held),
         }))

@@ -14,6 +14,9 @@ use crate::Client;
 /// Weight of the newest job in the mean of their costs.
 const NEWEST_WEIGHT: f64 = 1.0 / 16.0;
 
+/// Most clients of which one without a job is remembered. New clients might otherwise keep `now` from passing, and add up.
+const MAX_KNOWN: usize = 1024;
+
 /// The order of a client's jobs: by their deadlines, then by their numbers.
 type Rank = (Instant, u64);
 
@@ -145,9 +148,9 @@ impl<C: Client> Turns<C> {
             self.mean_cost += NEWEST_WEIGHT * (cost - self.mean_cost);
         }
         // An idle client is kept only while it has had more than a new one begins with.
-        let now = self.now;
+        let (now, are_few) = (self.now, self.clients.len() <= MAX_KNOWN);
         self.clients
-            .retain(|_, share| !share.is_idle() || share.had > now);
+            .retain(|_, share| !share.is_idle() || are_few && share.had > now);
         if self.clients.values().all(Share::is_idle) {
             self.clients.clear();
         }
@@ -297,6 +300,23 @@ mod tests {
         // Nobody waits for one that goes on as long as there is time.
         turns.set_due(&mut a[0], due(10), false);
         assert_eq!(expected(&turns, "a", due(50)), 30.0);
+    }
+
+    #[test]
+    fn clients_that_come_once_do_not_add_up() {
+        let start = Instant::now();
+        let mut turns = Turns::new(2);
+        let busy = turns.open(0, start);
+        turns.wait(&busy);
+        assert!(turns.begin(&busy));
+        for client in 1..3 * MAX_KNOWN {
+            let once = turns.open(client, start);
+            turns.wait(&once);
+            assert!(turns.begin(&once));
+            turns.end(&once, SLICE);
+            turns.close(&once, Cost::Whole(SLICE));
+            assert!(turns.clients.len() <= MAX_KNOWN + 1);
+        }
     }
 
     proptest! {

@@ -32,7 +32,7 @@ pub(crate) struct Door {
     rates: Mutex<HashMap<Arc<str>, Rate>>,
 }
 
-/// What a method needs.
+/// The scope that a method needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Need {
     /// Nothing: probes know no secrets.
@@ -60,10 +60,13 @@ fn need(path: &str) -> Need {
 impl Door {
     /// Reads the file of tokens, if there is one; the error lists everything that is wrong with it.
     pub(crate) fn open(file: Option<PathBuf>, takes_certificates: bool) -> Result<Self, Vec<String>> {
-        let tokens = file.as_deref().map(Tokens::read).transpose()?;
+        let tokens = match &file {
+            Some(file) => Tokens::read(file, &Tokens::default())?,
+            None => Tokens::default(),
+        };
         Ok(Self {
             file,
-            tokens: RwLock::new(Arc::new(tokens.unwrap_or_default())),
+            tokens: RwLock::new(Arc::new(tokens)),
             takes_certificates,
             rates: Mutex::default(),
         })
@@ -98,9 +101,13 @@ impl Door {
         Ok(Caller(Some(identity)))
     }
 
-    fn identity(&self, headers: &HeaderMap, peer: Option<&Arc<str>>) -> Result<Arc<Identity>, ServiceError> {
+    fn tokens(&self) -> Arc<Tokens> {
         // No code panics while it holds the lock.
-        let tokens = Arc::clone(&self.tokens.read().unwrap_or_else(PoisonError::into_inner));
+        Arc::clone(&self.tokens.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn identity(&self, headers: &HeaderMap, peer: Option<&Arc<str>>) -> Result<Arc<Identity>, ServiceError> {
+        let tokens = self.tokens();
         if let Some(secret) = bearer(headers) {
             return tokens
                 .of_secret(secret)
@@ -111,7 +118,7 @@ impl Door {
         let name = peer
             .map(|peer| format!("{CERTIFICATE}{peer}"))
             .ok_or(ServiceError::TokenMissing)?;
-        Ok(tokens.of_certificate(&name).cloned().unwrap_or_else(|| {
+        Ok(tokens.named(&name).cloned().unwrap_or_else(|| {
             let quotas = Quotas::default();
             Arc::new(Identity::new(name.into(), Scope::ALL.to_vec(), false, quotas))
         }))
@@ -135,10 +142,10 @@ impl Reloadable for Door {
         self.file.as_deref().into_iter().collect()
     }
 
-    /// Calls from now on are judged by what is read; running ones go on.
+    /// Calls from now on are judged by the new tokens; running ones go on.
     fn reload(&self) -> Result<(), Vec<String>> {
         if let Some(file) = &self.file {
-            let tokens = Arc::new(Tokens::read(file)?);
+            let tokens = Arc::new(Tokens::read(file, &self.tokens())?);
             *self.tokens.write().unwrap_or_else(PoisonError::into_inner) = tokens;
         }
         Ok(())

@@ -1,14 +1,19 @@
-//! Who may call: clients that tokens or certificates name, what each may do, and what belongs to whom.
+//! Who may call: clients that tokens or certificates name, with their rights and belongings.
 //!
-//! [`Door`] lets a call in, or refuses it before its message is read. It makes the call's [`Caller`], who is the [`Owner`] of what the
-//! call creates. Without tokens and certificates, anyone may do anything, and everything is everybody's.
+//! [`Door`] lets a call in, or refuses it before its message is read. It makes the call's [`Caller`], who is the [`Owner`] of objects
+//! and rigs that the call creates. Without tokens and certificates, anyone may do anything, and everything is everybody's.
 
 mod door;
 mod tokens;
 
-use std::{fmt, sync::Arc, time::Duration};
-
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use std::{
+    fmt,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Duration,
+};
 
 pub use self::tokens::new_token;
 pub(crate) use self::{door::Door, tokens::Quotas};
@@ -26,11 +31,11 @@ pub(crate) struct Caller(Option<Arc<Identity>>);
 pub(crate) struct Identity {
     pub name: Arc<str>,
     pub scopes: Vec<Scope>,
-    /// True if what it creates is everybody's.
+    /// True if its creations are everybody's.
     pub shared: bool,
     pub quotas: Quotas,
-    /// A permit per search of its quota.
-    searches: Arc<Semaphore>,
+    /// Number of its searches, running and waiting, if it has a quota of them.
+    searches: Arc<AtomicUsize>,
 }
 
 impl Identity {
@@ -40,12 +45,22 @@ impl Identity {
             scopes,
             shared,
             quotas,
-            searches: Arc::new(Semaphore::new(quotas.searches.unwrap_or(0))),
+            searches: Arc::default(),
         }
     }
 }
 
-/// What a call does; a client may make calls of some kinds only.
+/// A search within its client's quota, until this is dropped.
+#[derive(Debug)]
+pub(crate) struct QuotaSearch(Arc<AtomicUsize>);
+
+impl Drop for QuotaSearch {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// The kind of a call; a client may make calls of some kinds only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Scope {
@@ -98,7 +113,7 @@ impl Caller {
         self.0.as_ref().map(|identity| &identity.name)
     }
 
-    /// The owner of what the caller creates.
+    /// The owner of the caller's creations.
     pub(crate) fn owner(&self) -> Owner {
         let owner = self.0.as_ref().filter(|identity| !identity.shared);
         Owner(owner.map(|identity| Arc::clone(&identity.name)))
@@ -111,20 +126,23 @@ impl Caller {
     }
 
     /// Takes a search of the caller's quota, if it has one.
-    pub(crate) fn take_search(&self) -> Result<Option<OwnedSemaphorePermit>, ServiceError> {
+    pub(crate) fn take_search(&self) -> Result<Option<QuotaSearch>, ServiceError> {
         let limited = self
             .0
             .as_ref()
-            .and_then(|identity| Some((identity, identity.quotas.searches?)));
-        let Some((identity, most)) = limited else {
+            .and_then(|identity| Some((&identity.searches, identity.quotas.searches?)));
+        let Some((searches, most)) = limited else {
             return Ok(None);
         };
-        let permit = Arc::clone(&identity.searches).try_acquire_owned();
-        permit.map(Some).map_err(|_| ServiceError::QuotaExceeded {
-            quota: Quota::Searches,
-            maximum: most as u64,
-            retry_after: Some(RETRY_SEARCH_AFTER),
-        })
+        let another = |held| (held < most).then_some(held + 1);
+        match searches.fetch_update(Ordering::Relaxed, Ordering::Relaxed, another) {
+            Ok(_) => Ok(Some(QuotaSearch(Arc::clone(searches)))),
+            Err(_) => Err(ServiceError::QuotaExceeded {
+                quota: Quota::Searches,
+                maximum: most as u64,
+                retry_after: Some(RETRY_SEARCH_AFTER),
+            }),
+        }
     }
 
     /// Checks that the caller may change or delete something with this name and owner.

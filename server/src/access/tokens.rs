@@ -1,15 +1,14 @@
-//! The file of tokens: each client's name, the hashes of its secrets, and what it may do.
+//! The file of tokens: each client's name, the hashes of its secrets, and its rights.
 
 use std::{collections::BTreeMap, fs, num::NonZeroU32, path::Path, sync::Arc};
 
 use base64::{Engine as _, engine::general_purpose::URL_SAFE_NO_PAD};
-use rustls::crypto::ring;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 
 use super::{Identity, Scope};
-use crate::wire::hex;
+use crate::{tls::random_bytes, wire::hex};
 
 /// Most clients in a file. Each call compares its secret with all of them, which takes microseconds.
 const MAX_CLIENTS: usize = 1000;
@@ -31,7 +30,7 @@ pub(super) const CERTIFICATE: &str = "cert:";
 
 type Hash = [u8; 32];
 
-/// What a client may use of the server at most; absent ones are bounded by the server's limits only.
+/// Bounds on a client's use of the server; absent ones are the server's own limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Quotas {
     /// Calls per second, over a second.
@@ -73,21 +72,27 @@ fn is_false(value: &bool) -> bool {
 #[derive(Debug, Default)]
 pub(super) struct Tokens {
     by_hash: Vec<(Hash, Arc<Identity>)>,
-    by_certificate: BTreeMap<Arc<str>, Arc<Identity>>,
+    by_name: BTreeMap<Arc<str>, Arc<Identity>>,
 }
 
 impl Tokens {
-    /// Reads a file; the error lists everything that is wrong with it.
-    pub(super) fn read(path: &Path) -> Result<Self, Vec<String>> {
+    /// Reads a file, whose clients keep the searches that they have in those `before`; the error lists everything that is wrong.
+    pub(super) fn read(path: &Path, before: &Self) -> Result<Self, Vec<String>> {
         let wrong = |reason: &dyn std::fmt::Display| format!("tokens_file is {}; {reason}", path.display());
         let text = fs::read_to_string(path)
             .map_err(|error| vec![wrong(&format_args!("it must be a file of tokens: {error}"))])?;
-        Self::parse(&text).map_err(|problems| problems.iter().map(|problem| wrong(problem)).collect())
+        Self::parse(&text, before).map_err(|problems| problems.iter().map(|problem| wrong(problem)).collect())
     }
 
-    fn parse(text: &str) -> Result<Self, Vec<String>> {
-        let entries: BTreeMap<String, Entry> =
-            toml::from_str(text).map_err(|error| vec![error.to_string()])?;
+    fn parse(text: &str, before: &Self) -> Result<Self, Vec<String>> {
+        let entries: BTreeMap<String, Entry> = toml::from_str(text).map_err(|error| {
+            // Not the whole error, which quotes a line that may have a secret.
+            let before = text
+                .get(..error.span().unwrap_or_default().start)
+                .unwrap_or_default();
+            let line = 1 + before.matches('\n').count();
+            vec![format!("line {line}: {}", error.message())]
+        })?;
         let mut problems = Vec::new();
         let mut tokens = Self::default();
         if entries.len() > MAX_CLIENTS {
@@ -98,16 +103,16 @@ impl Tokens {
         }
         for (name, entry) in entries {
             let start = problems.len();
-            let (identity, hashes) = checked(&name, entry, &mut problems);
+            let (mut identity, hashes) = checked(&name, entry, &mut problems);
             for problem in &mut problems[start..] {
                 *problem = format!("[{name:?}] {problem}");
             }
-            let identity = Arc::new(identity);
-            if name.starts_with(CERTIFICATE) {
-                tokens.by_certificate.insert(Arc::clone(&identity.name), identity);
-                continue;
+            if let Some(known) = before.by_name.get(&*name) {
+                identity.searches = Arc::clone(&known.searches);
             }
-            for hash in hashes {
+            let identity = Arc::new(identity);
+            // A certificate with hashes is a problem of its own.
+            for hash in hashes.into_iter().filter(|_| !name.starts_with(CERTIFICATE)) {
                 if tokens.by_hash.iter().any(|(other, _)| *other == hash) {
                     problems.push(format!(
                         "[{name:?}] sha256 has {}; no other client may have it",
@@ -116,6 +121,7 @@ impl Tokens {
                 }
                 tokens.by_hash.push((hash, Arc::clone(&identity)));
             }
+            tokens.by_name.insert(Arc::clone(&identity.name), identity);
         }
         if problems.is_empty() {
             Ok(tokens)
@@ -136,9 +142,9 @@ impl Tokens {
         found
     }
 
-    /// The client whose certificate has this name, if the file says something about it.
-    pub(super) fn of_certificate(&self, name: &str) -> Option<&Arc<Identity>> {
-        self.by_certificate.get(name)
+    /// The client with this name, with its prefix if it has a certificate.
+    pub(super) fn named(&self, name: &str) -> Option<&Arc<Identity>> {
+        self.by_name.get(name)
     }
 }
 
@@ -165,8 +171,10 @@ fn checked(name: &str, entry: Entry, problems: &mut Vec<String>) -> (Identity, V
     for text in &entry.sha256 {
         match parse_hash(text) {
             Some(hash) => hashes.push(hash),
+            // Not the text, which may be a secret.
             None => problems.push(format!(
-                "sha256 has {text:?}; it must have 64 hexadecimal digits each"
+                "sha256 has a text of {} characters; each must be 64 hexadecimal digits",
+                text.chars().count()
             )),
         }
     }
@@ -212,12 +220,7 @@ fn parse_hash(text: &str) -> Option<Hash> {
 /// # Errors
 /// Says in words why the name is none, or that the system has no randomness.
 pub fn new_token(name: &str) -> Result<(String, String), String> {
-    let mut random = [0; SECRET_BYTES];
-    let provider = ring::default_provider();
-    provider
-        .secure_random
-        .fill(&mut random)
-        .map_err(|_| "the system has no randomness")?;
+    let random = random_bytes::<SECRET_BYTES>().ok_or("the system has no randomness")?;
     let secret = format!("{SECRET_START}{}", URL_SAFE_NO_PAD.encode(random));
     let entry = Entry {
         sha256: vec![hex(&Sha256::digest(&secret))],
@@ -229,20 +232,49 @@ pub fn new_token(name: &str) -> Result<(String, String), String> {
         bytes: None,
     };
     let text = toml::to_string(&BTreeMap::from([(name, entry)])).map_err(|error| error.to_string())?;
-    Tokens::parse(&text).map_err(|problems| problems.join("\n"))?;
+    Tokens::parse(&text, &Tokens::default()).map_err(|problems| problems.join("\n"))?;
     Ok((secret, text))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::access::Caller;
+
+    fn parse(text: &str) -> Result<Tokens, Vec<String>> {
+        Tokens::parse(text, &Tokens::default())
+    }
+
+    #[test]
+    fn searches_count_for_the_quota_after_the_file_was_read_again() {
+        let tokens = |most: usize, before: &Tokens| {
+            let hash = "0a".repeat(32);
+            let text = format!("[a]\nsha256 = ['{hash}']\nscopes = ['find']\nsearches = {most}");
+            Tokens::parse(&text, before).unwrap()
+        };
+        let caller = |of: &Tokens| Caller(of.named("a").cloned());
+        let before = tokens(2, &Tokens::default());
+        let running = [caller(&before).take_search(), caller(&before).take_search()];
+        assert!(running.iter().all(Result::is_ok) && caller(&before).take_search().is_err());
+        let after = tokens(3, &before);
+        let third = caller(&after).take_search().unwrap();
+        assert!(caller(&after).take_search().is_err());
+        drop((running, third));
+        assert!(
+            (0..3)
+                .map(|_| caller(&after).take_search())
+                .collect::<Vec<_>>()
+                .iter()
+                .all(Result::is_ok)
+        );
+    }
 
     #[test]
     fn a_new_token_is_known_by_its_secret_and_by_no_other() {
         let (secret, entry) = new_token("studio.7").unwrap();
         assert!(!entry.contains(&secret), "{entry}");
         let (other, _) = new_token("studio.7").unwrap();
-        let tokens = Tokens::parse(&entry).unwrap();
+        let tokens = parse(&entry).unwrap();
         let found = tokens.of_secret(secret.as_bytes()).unwrap();
         assert_eq!((&*found.name, &*found.scopes), ("studio.7", &Scope::ALL[..]));
         for wrong in [&*other, "", &secret[..secret.len() - 1], &format!("{secret} ")] {
@@ -261,12 +293,12 @@ mod tests {
              [e]\nscopes = ['read']\nshared = true\nobjects = 5\n\
              [f]\nsha256 = ['{hash}']\nscopes = ['write']"
         );
-        let problems = Tokens::parse(&text).unwrap_err();
+        let problems = parse(&text).unwrap_err();
         let parts = [
             "[\"a\"] searches is 0",
             "[\"b c\"] is no name",
             "[\"b c\"] scopes is []",
-            "[\"b c\"] sha256 has \"12\"",
+            "[\"b c\"] sha256 has a text of 2 characters",
             "[\"cert:d\"] sha256 is present",
             "[\"e\"] sha256 is absent",
             "[\"e\"] shared is true",
@@ -281,11 +313,17 @@ mod tests {
         assert_eq!(problems.len(), parts.len(), "{problems:?}");
         for wrong in [
             "[a]\nscopes = ['all']",
-            "[a]\nsecret = 'x'",
-            "[a",
+            "[a]\nsecret = 'abc'",
+            "[a]\nsecret = 'abc",
             "[a]\nscopes = []\n[a]",
         ] {
-            assert_eq!(Tokens::parse(wrong).unwrap_err().len(), 1, "{wrong}");
+            let [problem] = &parse(wrong).unwrap_err()[..] else {
+                panic!("{wrong} has one problem");
+            };
+            assert!(
+                problem.starts_with("line ") && !problem.contains("abc"),
+                "{problem}"
+            );
         }
     }
 }

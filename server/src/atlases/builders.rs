@@ -19,6 +19,7 @@ use super::{files::AtlasFiles, growing::work};
 use crate::{
     atlas_slots::Demand,
     executor::{SearchExecutor, lower_priority},
+    limits::locked,
     objects::{
         StoredObject,
         store::{Need, ObjectStore},
@@ -194,8 +195,7 @@ impl BuildQueue {
     }
 
     fn jobs(&self) -> MutexGuard<'_, VecDeque<BuildJob>> {
-        // No code panics while it holds the lock; if some did, the queue would still be consistent.
-        self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.jobs)
     }
 }
 

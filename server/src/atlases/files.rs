@@ -224,7 +224,7 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::{os::unix::fs::MetadataExt as _, time::Duration};
 
     use glam::Vec3;
 
@@ -255,11 +255,7 @@ mod tests {
         assert_eq!(names.len(), 1, "{names:?}");
         let path = folder.0.join(&names[0]);
         assert_eq!(path.extension(), Some(EXTENSION.as_ref()));
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
-        }
+        assert_eq!(fs::metadata(&path).unwrap().mode() & 0o777, 0o600);
         assert!(is_part_file(&part_of(&path)), "{:?}", part_of(&path));
         let whole = fs::read(&path).unwrap();
         for broken in [&whole[..whole.len() / 2], b"", &[&whole[..], b"more"].concat()] {

@@ -17,19 +17,19 @@ use crate::{
 
 /// The body, which ends with the status of a shutdown once that has begun and nothing more is ready.
 pub(super) fn ended_by(inner: Body, shutdown: CancellationToken) -> Body {
-    let ending = Ending {
+    let ending = ShutdownFilter {
         shutdown: Box::pin(shutdown.cancelled_owned()),
         has_ended: false,
     };
     filtered(inner, ending)
 }
 
-struct Ending {
+struct ShutdownFilter {
     shutdown: Pin<Box<WaitForCancellationFutureOwned>>,
     has_ended: bool,
 }
 
-impl FrameFilter for Ending {
+impl FrameFilter for ShutdownFilter {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         if self.has_ended {
             return Poll::Ready(None);

@@ -146,6 +146,7 @@ impl Middleware<Body> for Calls {
         let mut call = OpenCall::new(
             path,
             context.clone(),
+            reader.clone(),
             &self.in_flight,
             &self.reserve,
             &self.traces,

@@ -18,7 +18,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_proto::v1;
+use grasp_proto::{code_name, v1};
 use http::{HeaderMap, HeaderValue, Response};
 use tokio::sync::watch;
 use tonic::{Code, body::Body};
@@ -39,6 +39,7 @@ use crate::{
     limits::locked,
     metrics::{Method, Metrics},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+    net::Reader,
     traces::{CallTrace, Interval, Traces},
 };
 
@@ -213,20 +214,19 @@ fn code_in(headers: &HeaderMap) -> Option<Code> {
 }
 
 /// A call from its arrival to the end of its answer, when it is logged.
-///
-/// It measures for how long the transport waits for parts of the answer after the end of the call's search. Nothing counts while the
-/// client does not read. A client drops the call at its deadline: the answer would have taken at least until then.
 #[derive(Debug)]
 struct OpenCall {
     method: Method,
     path: Cow<'static, str>,
     context: CallContext,
-    /// `None` is logged as cancelled.
+    /// `None` of one that is cancelled, or lost with its connection.
     code: Option<Code>,
+    reader: Option<Arc<Reader>>,
     reserve: Arc<DeadlineReserve>,
     traces: Traces,
     transport: Transport,
-    /// How long the transport has waited for parts of the answer since the end of the search.
+    /// How long the transport has waited for parts of the answer since the end of the search. Nothing counts while the client does not
+    /// read; one that drops the call at its deadline would have waited at least until then.
     waited: Duration,
     _in_flight: watch::Receiver<()>,
 }
@@ -246,6 +246,7 @@ impl OpenCall {
     fn new(
         path: &str,
         context: CallContext,
+        reader: Option<Arc<Reader>>,
         in_flight: &watch::Sender<()>,
         reserve: &Arc<DeadlineReserve>,
         traces: &Traces,
@@ -260,6 +261,7 @@ impl OpenCall {
                 .map_or_else(|| Cow::Owned(clipped()), Cow::Borrowed),
             context,
             code: None,
+            reader,
             reserve: Arc::clone(reserve),
             traces: traces.clone(),
             transport: Transport::Waits,
@@ -353,7 +355,15 @@ impl Drop for OpenCall {
         self.answered();
         let record = &self.context.record;
         let search = record.search.get();
-        let code = self.code.unwrap_or(Code::Cancelled);
+        // A connection that the server closes is unavailable to its client.
+        let code = self.code.unwrap_or_else(|| {
+            let is_cut_off = self.reader.as_ref().is_some_and(|reader| reader.is_closing());
+            if is_cut_off {
+                Code::Unavailable
+            } else {
+                Code::Cancelled
+            }
+        });
         let total = self.context.arrived.elapsed();
         let metrics = &self.context.metrics;
         metrics.call_ended(self.method, code, total);
@@ -365,7 +375,7 @@ impl Drop for OpenCall {
         if self.traces.are_on() {
             self.trace(code);
         }
-        let (status, total_us) = (grpc_name(code), micros(total));
+        let (status, total_us) = (code_name(code), micros(total));
         macro_rules! log {
             ($level:ident) => {
                 tracing::$level!(
@@ -396,18 +406,6 @@ fn micros(duration: Duration) -> u64 {
     u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
 }
 
-/// A code in the spelling of gRPC: `INVALID_ARGUMENT`.
-fn grpc_name(code: Code) -> String {
-    let mut name = String::new();
-    for character in format!("{code:?}").chars() {
-        if !name.is_empty() && character.is_ascii_uppercase() {
-            name.push('_');
-        }
-        name.push(character.to_ascii_uppercase());
-    }
-    name
-}
-
 /// A call ends with the body of its answer.
 impl FrameFilter for OpenCall {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
@@ -422,16 +420,5 @@ impl FrameFilter for OpenCall {
             self.read_status(trailers);
         }
         polled
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn status_codes_are_spelled_as_in_grpc() {
-        assert_eq!(grpc_name(Code::InvalidArgument), "INVALID_ARGUMENT");
-        assert_eq!(grpc_name(Code::Ok), "OK");
     }
 }

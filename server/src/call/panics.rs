@@ -27,15 +27,15 @@ pub(super) async fn contained<E>(
         answer.await
     };
     match AssertUnwindSafe(answer).catch_unwind().await {
-        Ok(answer) => Ok(answer?.map(|body| filtered(body, Contained(faults)))),
+        Ok(answer) => Ok(answer?.map(|body| filtered(body, PanicFilter(faults)))),
         Err(_) => Ok(Status::from(ServiceError::Panicked).into_http()),
     }
 }
 
 /// Ends a body that panics with trailers.
-struct Contained(Faults);
+struct PanicFilter(Faults);
 
-impl FrameFilter for Contained {
+impl FrameFilter for PanicFilter {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         let polled = catch_unwind(AssertUnwindSafe(|| {
             self.0.at(FaultPoint::Body);

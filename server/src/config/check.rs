@@ -65,17 +65,14 @@ impl Check {
         }
     }
 
-    /// A path that is not empty. The folder itself is opened later.
-    pub(super) fn folder(&mut self, key: &str, raw: &mut Option<PathBuf>, value: &mut Option<PathBuf>) {
-        self.path(key, "a folder", raw, value);
-    }
-
-    /// A path that is not empty. The file itself is read later.
-    pub(super) fn file(&mut self, key: &str, raw: &mut Option<PathBuf>, value: &mut Option<PathBuf>) {
-        self.path(key, "a file", raw, value);
-    }
-
-    fn path(&mut self, key: &str, kind: &str, raw: &mut Option<PathBuf>, value: &mut Option<PathBuf>) {
+    /// A path that is not empty. The file or folder itself is opened later.
+    pub(super) fn path(
+        &mut self,
+        key: &str,
+        raw: &mut Option<PathBuf>,
+        value: &mut Option<PathBuf>,
+        kind: &str,
+    ) {
         if raw.as_ref().is_some_and(|path| path.as_os_str().is_empty()) {
             self.reject(key, "\"\"", format_args!("{kind}, or absent"));
         }

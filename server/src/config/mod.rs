@@ -2,11 +2,13 @@
 
 mod check;
 mod raw;
+mod sources;
 
 use std::{fmt, num::NonZeroUsize, path::PathBuf, time::Duration};
 
 pub use crate::saved::StorePlace;
-pub use raw::{RawConfig, read_file, unknown_variables};
+pub use raw::RawConfig;
+pub use sources::{read_file, unknown_variables};
 
 use grasp_import::MeshLimits;
 use grasp_synthesis::search::settings::REFINEMENT;
@@ -179,10 +181,9 @@ impl Config {
         self.atlas_directory.clone().or_else(beside_objects)
     }
 
-    /// Most threads besides those that search, build atlases and handle requests: one per search, upload and message being packed,
-    /// two per preparation, one for a deletion or preparation ahead of calls, one that reads
-    /// changed settings, and those that load saved objects or wait for the
-    /// disk.
+    /// Most threads besides those that search, build atlases and handle requests: one per search, upload and message being packed, two
+    /// per preparation, one for a deletion or preparation ahead of calls, one that reads changed settings, and those that load saved
+    /// objects or wait for the disk.
     pub fn blocking_threads(&self) -> usize {
         let uploads = self.maximum_uploads.get();
         let of_store = if self.place == StorePlace::Memory {

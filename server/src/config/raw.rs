@@ -1,10 +1,6 @@
 //! The unchecked configuration: flags before environment before file before defaults.
 
-use std::{
-    collections::BTreeSet,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeSet, path::PathBuf};
 
 use clap::{
     Args,
@@ -21,8 +17,6 @@ use crate::{
     traces::{NEEDED_ENDPOINT, parse_endpoint},
     web::{NEEDED_ORIGINS, parse_origins},
 };
-
-const VARIABLE_PREFIX: &str = "GRASP_";
 
 /// Every key, unchecked. An absent one falls back to the next source.
 #[derive(Args, Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -128,8 +122,8 @@ pub struct RawConfig {
     /// Folder of objects to start with: a mesh NAME.obj, .stl, .ply, .glb or .gltf with NAME.toml becomes objects/NAME [default: none].
     ///
     /// The TOML file has the keys of a `GraspObject`: `mass_kg` and optionally `meters_per_unit`, `z_up`, `parts`, `center_of_mass`,
-    /// `friction`, `regions`, `known_grips` and `labels`. Each file has the limits of an upload; all objects together have the limits `cache_objects` and `cache_bytes`, in addition to those that
-    /// clients create. They are never evicted.
+    /// `friction`, `regions`, `known_grips` and `labels`. Each file has the limits of an upload; all objects together have the limits
+    /// `cache_objects` and `cache_bytes`, in addition to those that clients create. They are never evicted.
     #[arg(long, env = "GRASP_OBJECTS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
     pub objects_directory: Option<PathBuf>,
     /// Low-priority threads that build the objects' atlases in the background [default: 1].
@@ -227,30 +221,6 @@ fn joined<S: Serializer>(texts: &Option<Vec<String>>, writer: S) -> Result<S::Ok
     texts.as_ref().map(|texts| texts.join(",")).serialize(writer)
 }
 
-/// Reads a configuration file.
-///
-/// # Errors
-/// The file cannot be read, is not TOML, or has an unknown key.
-pub fn read_file(path: &Path) -> Result<RawConfig, ConfigError> {
-    let text = fs::read_to_string(path).map_err(|source| ConfigError::Unreadable {
-        path: path.to_owned(),
-        source,
-    })?;
-    toml::from_str(&text).map_err(|source| ConfigError::Malformed {
-        path: path.to_owned(),
-        source: Box::new(source),
-    })
-}
-
-/// Names among `present` that have the server's prefix but are not `known`, most likely misspelt. They are logged, not
-/// rejected, because container platforms add their own variables.
-pub fn unknown_variables(present: impl IntoIterator<Item = String>, known: &[String]) -> Vec<String> {
-    present
-        .into_iter()
-        .filter(|name| name.starts_with(VARIABLE_PREFIX) && !known.contains(name))
-        .collect()
-}
-
 impl RawConfig {
     /// The keys whose values differ.
     pub fn differences(&self, other: &Self) -> Vec<String> {
@@ -267,6 +237,16 @@ impl RawConfig {
     /// [`ConfigError::BadValues`] with every invalid value.
     pub fn complete(&mut self, fallback: Self) -> Result<Config, ConfigError> {
         let mut config = Config::default();
+        for (raw, fallback, value) in [
+            (&mut self.viewer, fallback.viewer, &mut config.viewer),
+            (
+                &mut self.insecure_public,
+                fallback.insecure_public,
+                &mut config.insecure_public,
+            ),
+        ] {
+            *value = *raw.get_or_insert(fallback.unwrap_or(*value));
+        }
         let mut check = Check(Vec::new());
         /// Reads a key by one of [`Check`]'s methods into a value.
         macro_rules! read {
@@ -278,14 +258,11 @@ impl RawConfig {
         let (budgets, streams) = (&mut config.budgets, &mut config.streams);
         read!(addresses(listen => config.listen,));
         let (mut certificate, mut key, mut client_ca) = (None, None, None);
-        read!(file(tls_certificate => certificate,));
-        read!(file(tls_key => key,));
-        read!(file(tls_client_ca => client_ca,));
+        read!(path(tls_certificate => certificate, "a file"));
+        read!(path(tls_key => key, "a file"));
+        read!(path(tls_client_ca => client_ca, "a file"));
         config.tls = check.tls(certificate, key, client_ca);
-        read!(file(tokens_file => config.tokens_file,));
-        let insecure_public = self.insecure_public.or(fallback.insecure_public);
-        config.insecure_public = insecure_public.unwrap_or(config.insecure_public);
-        self.insecure_public = Some(config.insecure_public);
+        read!(path(tokens_file => config.tokens_file, "a file"));
         read!(number(workers => config.workers, 1..=1024));
         read!(number(io_threads => config.io_threads, 1..=1024));
         read!(time(default_budget_ms => budgets.default, 1..=600_000));
@@ -306,17 +283,15 @@ impl RawConfig {
         read!(number(cache_objects => config.store.objects, 1..=100_000));
         read!(number(cache_bytes => config.store.bytes, 1 << 20..=1 << 40));
         read!(number(maximum_rigs => config.maximum_rigs, 1..=10_000));
-        read!(folder(objects_directory => config.objects_directory,));
+        read!(path(objects_directory => config.objects_directory, "a folder"));
         read!(number(builder_threads => config.builder_threads, 0..=64));
         read!(number(learned_grips => config.learned_grips, 0..=1024));
-        read!(folder(atlas_directory => config.atlas_directory,));
+        read!(path(atlas_directory => config.atlas_directory, "a folder"));
         read!(number(maximum_connections => config.maximum_connections, 1..=1_000_000));
         read!(time(connection_idle_ms => config.connection_idle, 1000..=86_400_000));
         read!(time(connection_age_ms => config.connection_age, 1000..=86_400_000));
         read!(number(maximum_unread_bytes => config.maximum_unread_bytes, MAX_RESPONSE as u64..=1 << 30));
         read!(text(web_origins => config.web_origins, NEEDED_ORIGINS, parse_origins));
-        config.viewer = self.viewer.or(fallback.viewer).unwrap_or(config.viewer);
-        self.viewer = Some(config.viewer);
         let address = |text: &str| text.trim().parse::<ListenAddress>().ok();
         read!(optional(metrics_listen => config.metrics_listen, NEEDED_LISTEN, address));
         read!(optional(otlp_endpoint => config.otlp_endpoint, NEEDED_ENDPOINT, parse_endpoint));
@@ -405,11 +380,9 @@ mod tests {
                     _ => "".into(),
                 };
             }
-            let paths = ["objects_directory", "atlas_directory"];
-            let paths =
-                paths
-                    .into_iter()
-                    .chain(["tls_certificate", "tls_key", "tls_client_ca", "tokens_file"]);
+            let folders = ["objects_directory", "atlas_directory"];
+            let files = ["tls_certificate", "tls_key", "tls_client_ca", "tokens_file"];
+            let paths = folders.into_iter().chain(files);
             keys.extend(paths.map(|key| (key.to_owned(), "".into())));
             keys.insert("metrics_listen".to_owned(), "9464".into());
             keys.insert("otlp_endpoint".to_owned(), "localhost:4317".into());
@@ -418,12 +391,12 @@ mod tests {
                 panic!("most of it is wrong");
             };
             assert_eq!(bad.len(), expected, "{bad:?}");
-            let listen = "listen is \"\"; it must be an address like [::1]:50051, or unix:/PATH";
-            let workers = format!("workers is {number}; it must be 1 to 1024");
-            assert!(
-                bad.contains(&listen.to_owned()) && bad.contains(&workers),
-                "{bad:?}"
-            );
+            for expected in [
+                "listen is \"\"; it must be an address like [::1]:50051, or unix:/PATH",
+                &format!("workers is {number}; it must be 1 to 1024"),
+            ] {
+                assert!(bad.iter().any(|bad| bad == expected), "{bad:?}");
+            }
         }
         let mut raw = RawConfig {
             default_budget_ms: Some(500),
@@ -472,10 +445,8 @@ mod tests {
                 (Ok(_), Ok(())) => {}
                 (Err(error), Err(missing)) => {
                     let start = "listen is 0.0.0.0:2, 192.0.2.1:3, which other machines may reach, without ";
-                    assert!(
-                        error.to_string().starts_with(&format!("{start}{missing};")),
-                        "{error}"
-                    );
+                    let start = format!("{start}{missing};");
+                    assert!(error.to_string().starts_with(&start), "{error}");
                 }
                 (answer, _) => panic!("{others}: {answer:?}"),
             }
@@ -484,16 +455,10 @@ mod tests {
             ))
             .unwrap();
         }
-        let error = complete("tls_key = 'b'").unwrap_err();
-        assert!(
-            error.to_string().starts_with("tls_certificate is absent"),
-            "{error}"
-        );
-        let error = complete("tls_client_ca = 'b'").unwrap_err();
-        assert!(
-            error.to_string().starts_with("tls_certificate is absent"),
-            "{error}"
-        );
+        for alone in ["tls_key", "tls_client_ca"] {
+            let error = complete(&format!("{alone} = 'b'")).unwrap_err().to_string();
+            assert!(error.starts_with("tls_certificate is absent"), "{error}");
+        }
     }
 
     #[test]
@@ -505,14 +470,5 @@ mod tests {
         other.log = Some("debug".to_owned());
         other.objects_directory = Some("/objects".into());
         assert_eq!(one.differences(&other), ["log", "objects_directory"]);
-    }
-
-    #[test]
-    fn finds_misspelt_variables() {
-        let present = ["GRASP_WORKER", "GRASP_WORKERS", "PATH"].map(str::to_owned);
-        assert_eq!(
-            unknown_variables(present, &["GRASP_WORKERS".to_owned()]),
-            ["GRASP_WORKER"]
-        );
     }
 }

@@ -1,4 +1,4 @@
-//! Answers: gRPC's frames and status, turned into Connect's.
+//! Answers: gRPC's frames and status, converted to Connect's.
 
 use std::{
     borrow::Cow,

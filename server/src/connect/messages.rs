@@ -1,7 +1,7 @@
 //! The messages of calls over Connect: those of requests as gRPC's frames of protobuf, those of answers as JSON.
 //!
-//! Reading and writing JSON takes some 10 µs per kilobyte. Large messages are turned on other threads, as many as there are places;
-//! one that finds no place is turned at once.
+//! Reading and writing JSON takes some 10 µs per kilobyte. Large messages are converted on other threads, as many as there are places;
+//! one that finds no place is converted at once.
 
 use std::{
     io::Read as _,
@@ -35,26 +35,25 @@ pub(super) const PACKED: u8 = 1;
 /// The field of errors about all of the JSON.
 const BODY: &str = "body";
 
-/// Smallest message that is turned on another thread, in bytes.
+/// Smallest message that is converted on another thread, in bytes.
 const LARGE: usize = 32 << 10;
 
 /// Bytes of JSON per byte of protobuf, for messages of numbers.
 const JSON_GROWTH: usize = 5;
 
-/// Bytes of protobuf, besides the mesh, that a value in JSON takes at least on average. Values are kept in tens of bytes each while
-/// they are turned.
+/// Least bytes of protobuf per value in JSON, on average and besides the mesh; values take tens of bytes while they are converted.
 const BYTES_OF_VALUE: usize = 2;
 
 /// The layer inside that of calls; see the module documentation.
 #[derive(Clone, Debug)]
-pub(crate) struct Transcoding {
+pub(crate) struct Transcoder {
     /// Largest message of an upload, in bytes of protobuf.
     pub largest_upload: usize,
-    /// One permit per thread that turns messages.
+    /// One permit per thread that converts messages.
     pub places: Arc<Semaphore>,
 }
 
-impl Transcoding {
+impl Transcoder {
     /// Largest message of a request as it is written, in bytes.
     fn limit(&self, path: &str, call: &Call) -> usize {
         match (is_upload(path), call.format.json) {
@@ -67,7 +66,7 @@ impl Transcoding {
     }
 }
 
-impl Middleware<Body> for Transcoding {
+impl Middleware<Body> for Transcoder {
     fn handle<E, F>(&self, mut request: Request<Body>, next: impl FnOnce(Request<Body>) -> F) -> Answer<E>
     where
         E: Send + 'static,
@@ -92,7 +91,7 @@ impl Middleware<Body> for Transcoding {
             buffer: BytesMut::new(),
             ended: false,
             taken: false,
-            turning: Turning::new(&self.places),
+            converter: Converter::new(&self.places),
         };
         let answer = next(request.map(|body| filtered(body, reader)));
         if !call.format.json {
@@ -100,19 +99,19 @@ impl Middleware<Body> for Transcoding {
         }
         let writer = Writer {
             call,
-            turning: Turning::new(&self.places),
+            converter: Converter::new(&self.places),
         };
         Box::pin(async move { Ok(answer.await?.map(|body| filtered(body, writer))) })
     }
 }
 
-/// The turning of one message after the other.
-struct Turning {
+/// Converts one message after the other.
+struct Converter {
     running: Option<JoinHandle<Result<Bytes, ServiceError>>>,
     places: Arc<Semaphore>,
 }
 
-impl Turning {
+impl Converter {
     fn new(places: &Arc<Semaphore>) -> Self {
         Self {
             running: None,
@@ -120,36 +119,36 @@ impl Turning {
         }
     }
 
-    /// Begins to turn `bytes` bytes; returns the result if it is there at once.
+    /// Begins to convert `bytes` bytes; returns the result if it is there at once.
     fn begin(
         &mut self,
         bytes: usize,
-        turn: impl FnOnce() -> Result<Bytes, ServiceError> + Send + 'static,
+        convert: impl FnOnce() -> Result<Bytes, ServiceError> + Send + 'static,
     ) -> Option<Result<Bytes, ServiceError>> {
         let place = (bytes >= LARGE).then(|| Arc::clone(&self.places).try_acquire_owned());
         let Some(Ok(place)) = place else {
-            return Some(turn());
+            return Some(convert());
         };
         self.running = Some(tokio::task::spawn_blocking(move || {
             let _place = place;
-            turn()
+            convert()
         }));
         None
     }
 
-    /// The message that is being turned, if any.
+    /// The message that is being converted, if any.
     fn poll(&mut self, cx: &mut Context<'_>) -> Poll<Option<Result<Bytes, ServiceError>>> {
         let Some(running) = &mut self.running else {
             return Poll::Ready(None);
         };
-        let turned = ready!(Pin::new(running).poll(cx));
+        let converted = ready!(Pin::new(running).poll(cx));
         self.running = None;
         // Fails only after a panic, which is logged, or when the server ends.
-        Poll::Ready(Some(turned.unwrap_or(Err(ServiceError::Panicked))))
+        Poll::Ready(Some(converted.unwrap_or(Err(ServiceError::Panicked))))
     }
 }
 
-fn turned(result: Result<Bytes, ServiceError>) -> PolledFrame {
+fn converted(result: Result<Bytes, ServiceError>) -> PolledFrame {
     Poll::Ready(Some(result.map(Frame::data).map_err(Status::from)))
 }
 
@@ -166,28 +165,28 @@ struct MessageLimits {
 struct Reader {
     call: Call,
     limits: MessageLimits,
-    /// What has arrived of the next message, and perhaps of others.
+    /// The bytes of the next message that have arrived, and perhaps of others.
     buffer: BytesMut,
     /// The request has arrived to its end.
     ended: bool,
     /// The bare message has been read.
     taken: bool,
-    turning: Turning,
+    converter: Converter,
 }
 
 impl FrameFilter for Reader {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         loop {
-            if let Some(message) = ready!(self.turning.poll(cx)) {
-                return turned(message);
+            if let Some(message) = ready!(self.converter.poll(cx)) {
+                return converted(message);
             }
             match self.next() {
-                Err(error) => return turned(Err(error)),
+                Err(error) => return converted(Err(error)),
                 Ok(Some((message, packed))) => {
                     let (call, limits, length) = (self.call.clone(), self.limits, message.len());
-                    let turn = move || read(&call, message, packed, limits);
-                    if let Some(message) = self.turning.begin(length, turn) {
-                        return turned(message);
+                    let convert = move || read(&call, message, packed, limits);
+                    if let Some(message) = self.converter.begin(length, convert) {
+                        return converted(message);
                     }
                     continue;
                 }
@@ -207,7 +206,7 @@ impl FrameFilter for Reader {
     }
 
     fn is_empty(&self) -> bool {
-        self.ended && self.turning.running.is_none()
+        self.ended && self.converter.running.is_none()
     }
 }
 
@@ -336,14 +335,14 @@ fn put_frame(frames: &mut BytesMut, message: &[u8]) {
 /// Writes the messages of an answer as JSON.
 struct Writer {
     call: Call,
-    turning: Turning,
+    converter: Converter,
 }
 
 impl FrameFilter for Writer {
     fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         loop {
-            if let Some(messages) = ready!(self.turning.poll(cx)) {
-                return turned(messages);
+            if let Some(messages) = ready!(self.converter.poll(cx)) {
+                return converted(messages);
             }
             let frame = match ready!(next_frame(inner, cx)) {
                 Some(Ok(frame)) => frame,
@@ -355,16 +354,16 @@ impl FrameFilter for Writer {
             };
             let call = self.call.clone();
             if let Some(messages) = self
-                .turning
+                .converter
                 .begin(messages.len(), move || written(&call, messages))
             {
-                return turned(messages);
+                return converted(messages);
             }
         }
     }
 
     fn is_empty(&self) -> bool {
-        self.turning.running.is_none()
+        self.converter.running.is_none()
     }
 }
 
@@ -434,7 +433,7 @@ mod tests {
                 buffer: BytesMut::new(),
                 ended: false,
                 taken: false,
-                turning: Turning::new(&Arc::new(Semaphore::new(0))),
+                converter: Converter::new(&Arc::new(Semaphore::new(0))),
             };
             let body = Body::new(StreamBody::new(tokio_stream::iter(pieces)));
             let read = filtered(body, reader).collect().await.unwrap().to_bytes();

@@ -1,9 +1,9 @@
 //! The Connect protocol, beside gRPC and gRPC-Web: unary calls as plain JSON or protobuf by POST, for engines and tools without a
 //! gRPC library, and streams in envelopes.
 //!
-//! Two layers around the services, so that no handler knows of it. [`Connect`], the outer one, turns the headers of a request into
-//! gRPC's and the frames and status of an answer into Connect's. [`Transcoding`], inside the layer of calls, turns the messages into
-//! gRPC's frames and JSON into protobuf, and back. So calls, deadlines, uploads and arriving bytes are counted and bounded as they
+//! Two layers around the services, so that no handler knows of it. [`Connect`], the outer one, converts the headers of a request to
+//! gRPC's and the frames and status of an answer to Connect's. [`Transcoder`], inside the layer of calls, converts the messages to
+//! gRPC's frames and JSON to protobuf, and back. So calls, deadlines, uploads and arriving bytes are counted and bounded as they
 //! come in, and answers are packed as they go out.
 
 mod answers;
@@ -14,7 +14,7 @@ mod requests;
 use http::{Request, Response, Version};
 use tonic::body::Body;
 
-pub(crate) use self::messages::Transcoding;
+pub(crate) use self::messages::Transcoder;
 use self::{answers::answered, requests::call};
 use crate::middleware::{Answer, Middleware};
 

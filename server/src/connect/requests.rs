@@ -1,4 +1,4 @@
-//! Requests: their headers, turned into gRPC's.
+//! Requests: their headers, converted to gRPC's.
 
 use http::{HeaderMap, HeaderName, HeaderValue, Response, StatusCode, Version, header, request::Parts};
 use tonic::{Status, body::Body};
@@ -10,6 +10,7 @@ use super::{
 use crate::{
     error::ServiceError,
     methods::{Method, method, named_like},
+    middleware::is_gzip_among,
     wire::quoted,
 };
 
@@ -28,7 +29,7 @@ const OF_GRPC: [&str; 3] = ["grpc-timeout", "grpc-encoding", "grpc-accept-encodi
 /// The answer to a request that is refused.
 type Refusal = Box<Response<Body>>;
 
-/// A call, for the layer that turns its messages.
+/// A call, for the layer that converts its messages.
 #[derive(Clone, Debug)]
 pub(super) struct Call {
     pub format: Format,
@@ -42,7 +43,7 @@ pub(super) fn format(headers: &HeaderMap) -> Option<Format> {
     Format::of(headers.get(header::CONTENT_TYPE)?.to_str().ok()?)
 }
 
-/// Turns the headers of a request into gRPC's.
+/// Converts the headers of a request to gRPC's.
 ///
 /// # Errors
 /// The answer to a request that is refused.
@@ -82,7 +83,7 @@ pub(super) fn call(head: &mut Parts, format: Format) -> Result<Call, Refusal> {
         }
     };
     let accepts = match headers.remove(&accepted) {
-        Some(accepted) => accepted.to_str().is_ok_and(accepts_gzip),
+        Some(accepted) => is_gzip_among(&accepted),
         None => packed,
     };
     if accepts {
@@ -154,11 +155,4 @@ fn grpc_timeout(millis: &HeaderValue) -> Option<HeaderValue> {
         format!("{}S", millis.div_ceil(1000))
     };
     timeout.parse().ok()
-}
-
-fn accepts_gzip(accepted: &str) -> bool {
-    accepted.split(',').any(|coding| {
-        let mut parts = coding.split(';').map(str::trim);
-        parts.next() == Some("gzip") && !parts.any(|weight| weight == "q=0")
-    })
 }

@@ -1,5 +1,6 @@
 //! Errors of calls.
 
+mod listing;
 mod request_info;
 mod status;
 

@@ -1,4 +1,4 @@
-//! Prometheus' text format, version 0.0.4, and what counts: counters and histograms of atomic numbers, without a lock or an allocation.
+//! Prometheus' text format, version 0.0.4, and its counters and histograms: atomic numbers, without a lock or an allocation.
 
 use std::{
     fmt::{self, Write as _},

@@ -244,23 +244,6 @@ mod tests {
         }
     }
 
-    /// The target is 1 % of a warm call, 2 µs, in an optimised build; this one is not.
-    #[test]
-    fn counting_a_call_takes_microseconds() {
-        let metrics = Metrics::default();
-        let (start, calls) = (std::time::Instant::now(), 10_000);
-        for number in 0..calls {
-            let time = Duration::from_micros(number);
-            let method = metrics.call_started("/grasp.v1.GraspService/FindGrasp");
-            metrics.searched(time, "OUTCOME_BUDGET_EXHAUSTED", Some(v1::Check::Reach));
-            metrics.overshot(time);
-            metrics.call_ended(method, Code::Ok, time);
-        }
-        let each = start.elapsed() / calls as u32;
-        println!("{each:?} per call");
-        assert!(each < Duration::from_micros(100));
-    }
-
     #[test]
     fn calls_of_unknown_methods_count_together() {
         let metrics = Metrics::default();

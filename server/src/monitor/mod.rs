@@ -27,7 +27,7 @@ const MAX_TIME: Duration = Duration::from_secs(10);
 /// Pause after an accept failed.
 const PAUSE: Duration = Duration::from_millis(500);
 
-/// Answers what operators ask.
+/// Answers operators and probes.
 #[derive(Debug)]
 pub(crate) struct Monitor {
     handler: Handler,

@@ -1,4 +1,4 @@
-//! The page of metrics: what was counted, and how the server is when somebody asks.
+//! The page of metrics: counters, and gauges of the moment.
 
 use super::{Monitor, process};
 use crate::{limits::Places, metrics::Exposition};
@@ -23,7 +23,7 @@ impl Monitor {
         page.into_text()
     }
 
-    /// What is taken of each limit.
+    /// The use of each limit.
     fn write_places(&self, page: &mut Exposition) {
         let shared = &*self.handler;
         let of = |places: &Places| (places.taken(), places.maximum());

@@ -43,7 +43,7 @@ const MAX_STORE_FAILURES: u32 = 3;
 /// Where the server is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Phase {
-    /// It reads what is saved.
+    /// It reads saved objects and rigs.
     Starting,
     Serving,
     /// It has been told to end.

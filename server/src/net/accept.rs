@@ -7,7 +7,7 @@ use tokio_util::{sync::CancellationToken, task::TaskTracker};
 
 use super::{
     connections::Connections,
-    serving::{Service, Serving},
+    serving::{ConnectionServer, Service},
 };
 use crate::{
     client::Client,
@@ -25,18 +25,19 @@ const MAX_PAUSE: Duration = Duration::from_millis(500);
 pub(crate) async fn accept<S: Service>(
     mut listeners: Vec<Listener>,
     connections: Arc<Connections>,
-    serving: Serving<S>,
+    server: ConnectionServer<S>,
     stop: CancellationToken,
 ) {
     let tasks = TaskTracker::new();
-    let accepting = async {
+    let spawning = tasks.clone();
+    let accepting = async move {
         let mut pause = FIRST_PAUSE;
         loop {
             match accept_any(&mut listeners).await {
                 Ok((stream, client)) => {
                     pause = FIRST_PAUSE;
                     if let Some(place) = connections.admit(&client) {
-                        tasks.spawn(serving.clone().serve(stream, place));
+                        spawning.spawn(server.clone().serve(stream, place));
                     } else {
                         tracing::debug!(%client, "refused a connection");
                     }
@@ -54,7 +55,6 @@ pub(crate) async fn accept<S: Service>(
         }
     };
     stop.run_until_cancelled(accepting).await;
-    drop(listeners);
     tasks.close();
     tasks.wait().await;
 }

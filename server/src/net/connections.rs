@@ -14,7 +14,7 @@ use grasp_admission::may_hold_another;
 
 use super::{
     frames::{FrameBudget, PER_CONNECTION},
-    reader::{Closing, Phase, Reader},
+    reader::{CloseReason, Phase, Reader},
 };
 use crate::{client::Client, limits::locked, metrics::Counters, warning_rate::WarningRate};
 
@@ -59,12 +59,12 @@ struct Share {
 
 /// A connection that has a place until this is dropped.
 #[derive(Debug)]
-pub(super) struct Admitted {
+pub(super) struct ConnectionPlace {
     reader: Arc<Reader>,
     number: u64,
 }
 
-impl Deref for Admitted {
+impl Deref for ConnectionPlace {
     type Target = Arc<Reader>;
 
     fn deref(&self) -> &Arc<Reader> {
@@ -72,7 +72,7 @@ impl Deref for Admitted {
     }
 }
 
-impl Drop for Admitted {
+impl Drop for ConnectionPlace {
     fn drop(&mut self) {
         locked(&self.reader.all.open).remove(self.number);
     }
@@ -90,8 +90,7 @@ impl Open {
         Some(reader)
     }
 
-    /// Closes a connection, of this client or any, to make room: the one that has waited longest for the rest of its preface, or else
-    /// longest for a call, and for this time at least. False if there is none.
+    /// Closes the connection, of this client or any, that is longest without its preface, or else without a call for this time.
     fn evict(&mut self, of: Option<&Client>, idle: Duration) -> bool {
         let waiting = self.readers.iter().filter_map(|(&number, reader)| {
             let is_of = of.is_none_or(|client| reader.client == *client);
@@ -106,7 +105,7 @@ impl Open {
             return false;
         };
         if let Some(reader) = self.remove(number) {
-            reader.close(Closing::Displaced);
+            reader.close(CloseReason::Displaced);
         }
         true
     }
@@ -120,7 +119,7 @@ impl Connections {
             unread: AtomicUsize::new(0),
             start: Instant::now(),
             open: Mutex::default(),
-            closings: Counters::new("reason", Closing::NAMES),
+            closings: Counters::new("reason", CloseReason::NAMES),
             warnings: WarningRate::default(),
         })
     }
@@ -138,7 +137,7 @@ impl Connections {
     /// Gives a place to a client's new connection. If it may have no further one, the connection takes the place of one of its own
     /// that has no call; if all places are taken, of any client's. `None` if there is no such connection, or the client has sent
     /// too many frames.
-    pub(super) fn admit(self: &Arc<Self>, client: &Client) -> Option<Admitted> {
+    pub(super) fn admit(self: &Arc<Self>, client: &Client) -> Option<ConnectionPlace> {
         let mut open = locked(&self.open);
         let (held, frames) = match open.clients.get(client) {
             Some(share) => (share.held, Arc::clone(&share.frames)),
@@ -163,7 +162,7 @@ impl Connections {
         open.accepted += 1;
         let number = open.accepted;
         open.readers.insert(number, Arc::clone(&reader));
-        Some(Admitted { reader, number })
+        Some(ConnectionPlace { reader, number })
     }
 
     /// Closes the connection that can best be spared, where the process has no file left for another one.
@@ -183,7 +182,7 @@ impl Connections {
     fn close_stalled_since(&self, longest: Duration) {
         for reader in self.readers() {
             if reader.stalled() > longest {
-                reader.close(Closing::Stalled);
+                reader.close(CloseReason::Stalled);
             }
         }
     }
@@ -201,7 +200,7 @@ impl Connections {
             && let Some((held, largest)) = open.pop()
         {
             sum -= held.bytes;
-            largest.close(Closing::TooManyBytes);
+            largest.close(CloseReason::TooManyBytes);
         }
     }
 
@@ -243,7 +242,7 @@ mod tests {
         Connections::new(100, bytes)
     }
 
-    fn connect(all: &Arc<Connections>) -> Admitted {
+    fn connect(all: &Arc<Connections>) -> ConnectionPlace {
         all.admit(&Client::Local).expect("there is a place")
     }
 

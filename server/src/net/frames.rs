@@ -38,12 +38,12 @@ const DATA: u8 = 0;
 const HEADERS: u8 = 1;
 const CONTINUATION: u8 = 9;
 
-/// What a client may still send.
+/// The frames that a client may still send.
 #[derive(Debug)]
-pub(super) struct FrameBudget(Mutex<Saved>);
+pub(super) struct FrameBudget(Mutex<SavedFrames>);
 
 #[derive(Debug)]
-struct Saved {
+struct SavedFrames {
     frames: u64,
     /// When time was last counted.
     at: Instant,
@@ -51,7 +51,7 @@ struct Saved {
 
 impl FrameBudget {
     pub(super) fn new() -> Self {
-        Self(Mutex::new(Saved {
+        Self(Mutex::new(SavedFrames {
             frames: MAX_SAVED,
             at: Instant::now(),
         }))
@@ -83,7 +83,7 @@ impl FrameBudget {
     }
 }
 
-impl Saved {
+impl SavedFrames {
     fn grow(&mut self, now: Instant) {
         const FRAME: Duration = Duration::from_micros(1_000_000 / PER_SECOND);
         let grown = now.saturating_duration_since(self.at).as_micros() / FRAME.as_micros();
@@ -99,7 +99,7 @@ impl Saved {
 /// Follows the frames of a connection, whose bytes arrive in pieces of any size.
 #[derive(Debug, Default)]
 pub(super) struct FrameCount {
-    /// What has arrived of a frame's header.
+    /// The bytes of a frame's header that have arrived.
     header: [u8; FRAME_HEADER],
     arrived: usize,
     /// Bytes that are missing of the frame after its header.

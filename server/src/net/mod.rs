@@ -15,4 +15,4 @@ pub(crate) use accept::accept;
 pub(crate) use answers::{UnreadCount, arriving};
 pub(crate) use connections::Connections;
 pub(crate) use reader::Reader;
-pub(crate) use serving::{Lifetime, Serving};
+pub(crate) use serving::{ConnectionServer, Lifetime};

@@ -42,14 +42,14 @@ const RETRY_WHEN_ANSWERED: Duration = Duration::from_millis(50);
 
 /// Why a connection is closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Closing {
+pub(super) enum CloseReason {
     Displaced,
     Stalled,
     TooManyBytes,
     Frames,
 }
 
-impl Closing {
+impl CloseReason {
     /// The names of all in metrics.
     pub(super) const NAMES: [&str; 4] = ["displaced", "stalled", "too_many_bytes", "frames"];
 
@@ -65,7 +65,7 @@ impl Closing {
     }
 }
 
-/// A connection's client, and what waits on it. Times are in milliseconds since the start of [`Connections`].
+/// A connection's client, and the bytes that wait on it. Times are in milliseconds since the start of [`Connections`].
 #[derive(Debug)]
 pub(crate) struct Reader {
     pub(super) all: Arc<Connections>,
@@ -90,7 +90,7 @@ pub(crate) struct Reader {
     cut_off: CancellationToken,
 }
 
-/// What a connection does.
+/// The activity of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
     /// Its client has not sent all of HTTP/2's preface, or as many bytes of a request.
@@ -198,7 +198,7 @@ impl Reader {
         }
     }
 
-    /// What is left of a time that began then.
+    /// The rest of a time that began then.
     pub(super) fn left(&self, since: u64, time: Duration) -> Duration {
         time.saturating_sub(Duration::from_millis(self.all.now().saturating_sub(since)))
     }
@@ -268,13 +268,13 @@ impl Reader {
     pub(super) fn spend_frames(&self, frames: u64) -> bool {
         let within = self.frames.spend(frames);
         if !within {
-            self.close(Closing::Frames);
+            self.close(CloseReason::Frames);
         }
         within
     }
 
     /// Closes the connection at once.
-    pub(super) fn close(&self, reason: Closing) {
+    pub(super) fn close(&self, reason: CloseReason) {
         self.all.closings.add(reason as usize);
         if let Some(unlogged) = self.all.warnings.pass() {
             tracing::warn!(
@@ -288,7 +288,7 @@ impl Reader {
         self.cut_off.cancel();
     }
 
-    pub(super) fn is_closing(&self) -> bool {
+    pub(crate) fn is_closing(&self) -> bool {
         self.cut_off.is_cancelled()
     }
 

@@ -21,7 +21,7 @@ use tonic::{Status, body::Body};
 use tower::ServiceExt as _;
 
 use super::{
-    connections::Admitted,
+    connections::ConnectionPlace,
     frames::MIN_DATA,
     reader::{Phase, Reader},
     stream::WatchedStream,
@@ -82,7 +82,7 @@ impl<S> Service for S where
 
 /// How connections are served.
 #[derive(Clone, Debug)]
-pub(crate) struct Serving<S> {
+pub(crate) struct ConnectionServer<S> {
     pub service: S,
     /// Certificates, with which connections of TCP are encrypted.
     pub tls: Option<Arc<Tls>>,
@@ -102,9 +102,9 @@ pub(crate) struct Lifetime {
     pub close: CancellationToken,
 }
 
-impl<S: Service> Serving<S> {
+impl<S: Service> ConnectionServer<S> {
     /// Serves a connection to its end.
-    pub(super) async fn serve(self, stream: Stream, place: Admitted) {
+    pub(super) async fn serve(self, stream: Stream, place: ConnectionPlace) {
         let Self {
             service,
             tls,
@@ -158,8 +158,7 @@ impl<S: Service> Serving<S> {
 }
 
 impl Lifetime {
-    /// Waits until the connection should take no more calls: it is old, has had none for too long, or its client does not send its
-    /// preface; or the server stops.
+    /// Waits until the connection should take no more calls: it is old, idle or without its preface for too long, or the server stops.
     async fn until_leaving(&self, reader: &Reader) {
         // Connections that began together do not end together.
         let old = Instant::now() + self.age.mul_f64(0.9 + 0.2 * random_fraction());

@@ -1,7 +1,7 @@
 //! Data derived from objects for searches: built when first needed, and dropped first when memory is short.
 
 use std::{
-    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, OnceLock},
     thread,
     time::Instant,
 };
@@ -26,6 +26,7 @@ use super::{StoredObject, mesh_file::check_resized, store::SizeSlot};
 use crate::{
     error::ServiceError,
     executor::{before, run_stoppable},
+    limits::locked,
     rigs::store::RigStore,
     validate::RequestedSize,
 };
@@ -61,7 +62,7 @@ impl Derived {
     /// it.
     pub(crate) fn prepare(&self, rig: &str, stop: Stop<'_>) -> Result<(), Stopped> {
         // Nothing is left inconsistent if preparing panics.
-        let _preparing = self.preparing.lock().unwrap_or_else(PoisonError::into_inner);
+        let _preparing = locked(&self.preparing);
         if self.is_prepared(rig) {
             return Ok(());
         }
@@ -139,7 +140,7 @@ impl DerivedCell {
         build: impl FnOnce() -> Result<Arc<Derived>, Stopped>,
     ) -> Result<Arc<Derived>, Stopped> {
         // Nothing is left inconsistent if `build` panics.
-        let _building = self.building.lock().unwrap_or_else(PoisonError::into_inner);
+        let _building = locked(&self.building);
         if let Some(kept) = self.get() {
             return Ok(kept);
         }
@@ -160,8 +161,7 @@ impl DerivedCell {
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<Arc<Derived>>> {
-        // No code panics while it holds the lock.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.kept)
     }
 }
 

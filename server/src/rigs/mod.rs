@@ -4,7 +4,7 @@ pub(crate) mod store;
 
 use std::{
     collections::VecDeque,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex},
 };
 
 use grasp_assets::hands::Hand;
@@ -14,7 +14,7 @@ use grasp_synthesis::{
     propose::prepared::PreparedRig,
 };
 
-use crate::access::Owner;
+use crate::{access::Owner, limits::locked};
 
 /// Prefix of every rig's name.
 pub(crate) const COLLECTION: &str = "rigs/";
@@ -90,7 +90,7 @@ const CAPACITY: usize = 16;
 
 /// A scaled hand, with its original and the hundredths of its scale.
 #[derive(Debug)]
-struct Scaled {
+struct ScaledHand {
     of: Arc<Hand>,
     hundredths: u16,
     hand: Arc<Hand>,
@@ -98,14 +98,13 @@ struct Scaled {
 
 /// The hands that were requested last, the oldest first.
 #[derive(Debug, Default)]
-struct ScaledHands(Mutex<VecDeque<Scaled>>);
+struct ScaledHands(Mutex<VecDeque<ScaledHand>>);
 
 impl ScaledHands {
     /// A hand of another size.
     fn get(&self, hand: &RigHand, hundredths: u16) -> RigHand {
         let scale = f32::from(hundredths) / 100.0;
-        // No code panics while it holds the lock; if some did, the list would still be consistent.
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = locked(&self.0);
         let place = kept.iter().position(|scaled| {
             // Equal rigs may have different names, and answers name the rig.
             scaled.hundredths == hundredths
@@ -117,7 +116,7 @@ impl ScaledHands {
                 rig: PreparedRig::new(hand.hand.rig.scaled(scale)),
                 skin: Arc::clone(&hand.hand.skin),
             };
-            Scaled {
+            ScaledHand {
                 of: Arc::clone(&hand.hand),
                 hundredths,
                 hand: Arc::new(scaled),

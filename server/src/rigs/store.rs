@@ -4,7 +4,10 @@
 use std::{
     collections::BTreeMap,
     ops::Bound,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use bytes::Bytes;
@@ -19,7 +22,7 @@ use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
     access::{Caller, Owner},
     error::ServiceError,
-    limits::BYTES_BESIDES_MESH,
+    limits::{BYTES_BESIDES_MESH, locked},
     saved::{
         FieldMove, RIGS, Records, SavedFiles, Unreadable, field, is_decodable, message, move_fields, seal,
         wait_for,
@@ -39,6 +42,8 @@ pub(crate) struct RigStore {
     maximum: usize,
     /// `None` if rigs are in memory only.
     saved: Option<Records>,
+    /// True once a call has met a damaged rig since they were last read.
+    is_damage_met: AtomicBool,
     scaled: ScaledHands,
 }
 
@@ -60,6 +65,7 @@ impl RigStore {
             changing: Mutex::default(),
             maximum,
             saved,
+            is_damage_met: AtomicBool::new(false),
             scaled: ScaledHands::default(),
         }
     }
@@ -85,10 +91,26 @@ impl RigStore {
         })
     }
 
-    /// True if the record of the rig that a request names is damaged or missing.
+    /// True if the record of the rig that a request names is damaged or missing. It is read again soon.
     pub(crate) fn is_damaged(&self, name: &str) -> bool {
-        let id = name.strip_prefix(COLLECTION);
-        id.is_some_and(|id| self.created().get(id).is_some_and(Option::is_none))
+        let is_damaged = name
+            .strip_prefix(COLLECTION)
+            .is_some_and(|id| self.has_damaged(id));
+        self.is_damage_met.fetch_or(is_damaged, Ordering::Relaxed);
+        is_damaged
+    }
+
+    pub(crate) fn has_damaged(&self, id: &str) -> bool {
+        self.created().get(id).is_some_and(Option::is_none)
+    }
+
+    /// True if a call has met a damaged rig since the last time.
+    pub(crate) fn take_damage_met(&self) -> bool {
+        self.is_damage_met.swap(false, Ordering::Relaxed)
+    }
+
+    pub(crate) fn is_built_in(&self, id: &str) -> bool {
+        self.built_in.contains_key(id)
     }
 
     /// Keeps the name of a rig whose record is damaged or missing.
@@ -109,7 +131,7 @@ impl RigStore {
 
     /// Checks that a rig can be added: called before a rig is made, so that none is made in vain.
     pub(crate) fn check_room(&self, id: &str) -> Result<(), ServiceError> {
-        if self.built_in.contains_key(id) || self.created().contains_key(id) {
+        if self.is_built_in(id) || self.created().contains_key(id) {
             return Err(ServiceError::RigExists { name: name_of(id) });
         }
         if self.created().len() >= self.maximum {
@@ -132,13 +154,6 @@ impl RigStore {
             held,
             maximum: self.maximum,
         })
-    }
-
-    /// Checks that a rig, if it exists, does not belong to another client.
-    pub(crate) fn check_owned(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
-        let created = self.created();
-        let rig = created.get(id).and_then(Option::as_ref);
-        rig.map_or(Ok(()), |rig| caller.check_owns(&rig.name(), &rig.owner))
     }
 
     /// The records; `None` if rigs are in memory only.
@@ -187,14 +202,17 @@ impl RigStore {
         rig
     }
 
-    /// Removes a created rig.
-    pub(crate) fn delete(&self, id: &str) -> Result<(), ServiceError> {
-        if self.built_in.contains_key(id) {
+    /// Removes a created rig of the caller or of everybody. The owner of a damaged one is not known.
+    pub(crate) fn delete(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
+        if self.is_built_in(id) {
             return Err(ServiceError::RigBuiltIn { name: name_of(id) });
         }
         let _changing = self.changing();
-        if !self.created().contains_key(id) {
-            return Err(ServiceError::RigNotFound { name: name_of(id) });
+        match self.created().get(id) {
+            None => return Err(ServiceError::RigNotFound { name: name_of(id) }),
+            Some(rig) => rig
+                .iter()
+                .try_for_each(|rig| caller.check_owns(&rig.name(), &rig.owner))?,
         }
         if let Some(saved) = &self.saved {
             let mut others = self.ids();
@@ -217,6 +235,8 @@ impl RigStore {
         rigs.sort_by(|(a, _), (b, _)| a.cmp(b));
         let more = rigs.len() > size;
         rigs.truncate(size);
+        let is_damaged = rigs.iter().any(|(_, rig)| rig.is_none());
+        self.is_damage_met.fetch_or(is_damaged, Ordering::Relaxed);
         (rigs, more)
     }
 
@@ -231,12 +251,11 @@ impl RigStore {
     }
 
     fn changing(&self) -> MutexGuard<'_, ()> {
-        self.changing.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.changing)
     }
 
     fn created(&self) -> MutexGuard<'_, CreatedRigs> {
-        // No code panics while it holds the lock; if some did, the map would still be consistent.
-        self.created.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.created)
     }
 }
 
@@ -351,7 +370,7 @@ mod tests {
         let full = ServiceError::RigsFull { maximum: 2 };
         assert_eq!(store.check_room("c"), Err(full.clone()));
         assert_eq!(store.insert(rig("c"), None).unwrap_err(), full);
-        store.delete("a").unwrap();
+        store.delete("a", &Caller::default()).unwrap();
         store.insert(rig("c"), None).unwrap();
         let listed: Vec<String> = store.page(None, 10).0.into_iter().map(|(id, _)| id).collect();
         assert_eq!(listed, ["adult", "b", "c", "thesis"]);
@@ -375,18 +394,11 @@ mod tests {
             name: name_of("one0"),
             owner: "one".to_owned(),
         };
-        assert_eq!(store.check_owned("one0", &Caller::named("two")), Err(theirs));
-        assert_eq!(store.check_owned("one0", &one), Ok(()));
-        assert_eq!(
-            store.check_owned("one0", &Caller::default()),
-            Ok(()),
-            "without tokens, it is everybody's"
-        );
-        assert_eq!(
-            fill(&Caller::default(), "all"),
-            1,
-            "nothing is kept for others then"
-        );
+        assert_eq!(store.delete("one0", &Caller::named("two")), Err(theirs));
+        store.delete("one0", &one).unwrap();
+        // Without tokens, everything is everybody's, and nothing is kept for others.
+        store.delete("one1", &Caller::default()).unwrap();
+        assert_eq!(fill(&Caller::default(), "all"), 3);
     }
 
     #[test]

@@ -16,7 +16,7 @@ use tokio::{
 use uuid::Uuid;
 
 use super::{StoreError, in_use, this_process};
-use crate::limits::locked;
+use crate::{limits::locked, tls::random_id};
 
 /// The file, beside the folders.
 const FILE: &str = "lease";
@@ -56,14 +56,14 @@ pub(super) struct Lease {
     /// Differs from that of every other server.
     id: Uuid,
     /// `None` until it is taken, and once it is lost or given back.
-    held: Mutex<Option<Held>>,
+    held: Mutex<Option<HeldLease>>,
     /// Tells when it is lost.
     lost: Notify,
 }
 
 /// The file as this server wrote it.
 #[derive(Clone, Debug)]
-struct Held {
+struct HeldLease {
     version: UpdateVersion,
     /// Number of changes.
     changes: u64,
@@ -71,13 +71,13 @@ struct Held {
 }
 
 /// The file as it is.
-struct Seen {
+struct LeaseFile {
     version: UpdateVersion,
     /// The id of its owner, or nothing if it was given back; the number of its changes; and its owner for people.
     content: String,
 }
 
-impl Seen {
+impl LeaseFile {
     fn id(&self) -> &str {
         self.content.split_whitespace().next().unwrap_or_default()
     }
@@ -99,7 +99,7 @@ impl Lease {
         Arc::new(Self {
             files,
             times,
-            id: Uuid::new_v4(),
+            id: random_id(),
             held: Mutex::default(),
             lost: Notify::new(),
         })
@@ -112,7 +112,7 @@ impl Lease {
     ) -> Result<(), StoreError> {
         let Times { term, wait, poll, .. } = self.times;
         let start = Instant::now();
-        let mut last: Option<(Seen, Instant)> = None;
+        let mut last: Option<(LeaseFile, Instant)> = None;
         loop {
             let seen = self.look().await.map_err(|error| refused(&error))?;
             let mode = match (seen, &last) {
@@ -178,7 +178,7 @@ impl Lease {
         changed.unwrap_or_else(|_| Err(error("the lease of the store ran out before it was changed")))
     }
 
-    async fn look(&self) -> Result<Option<Seen>, Error> {
+    async fn look(&self) -> Result<Option<LeaseFile>, Error> {
         let file = match self.files.get(&Path::from(FILE)).await {
             Err(Error::NotFound { .. }) => return Ok(None),
             file => file?,
@@ -192,17 +192,17 @@ impl Lease {
             _ => return Err(error("the file lease is too large for one")),
         };
         let content = String::from_utf8_lossy(&bytes).into_owned();
-        Ok(Some(Seen { version, content }))
+        Ok(Some(LeaseFile { version, content }))
     }
 
-    async fn put(&self, mode: PutMode, changes: u64) -> Result<Held, Error> {
+    async fn put(&self, mode: PutMode, changes: u64) -> Result<HeldLease, Error> {
         let valid_until = Instant::now() + self.times.valid;
         let content = format!("{} {changes} {}", self.id.simple(), this_process());
         let path = Path::from(FILE);
         let put = self.files.put_opts(&path, content.into(), mode.into());
         let put = timeout_at(valid_until, put).await;
         let put = put.unwrap_or_else(|_| Err(error("changing the lease took too long")))?;
-        Ok(Held {
+        Ok(HeldLease {
             version: put.into(),
             changes,
             valid_until,

@@ -8,13 +8,12 @@
 mod lease;
 mod records;
 
-#[cfg(unix)]
-use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::{
     collections::HashMap,
     env, fmt,
     fs::{self, DirBuilder, File, TryLockError},
     io::{self, Read as _, Write as _},
+    os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _},
     path::{Path, PathBuf},
     process,
     sync::Arc,
@@ -29,7 +28,7 @@ use object_store::{
 
 use self::lease::Lease;
 pub(crate) use self::records::{
-    FieldMove, NotCreated, Records, Unreadable, field, is_decodable, message, move_fields, seal,
+    CreateFailure, FieldMove, Records, Unreadable, field, is_decodable, message, move_fields, seal,
 };
 use crate::error::ServiceError;
 
@@ -254,8 +253,7 @@ struct OwnedFolder {
 }
 
 impl OwnedFolder {
-    /// Creates the folder with these subfolders if necessary, takes it, and removes unfinished files. An error if it
-    /// lacks a subfolder that it had, or if another server uses it.
+    /// Takes the folder, which is created if necessary and must have the subfolders that it had, and removes unfinished files.
     fn open(path: &Path, subfolders: &[&str]) -> io::Result<Self> {
         let is_new = !path.join(LOCK).exists();
         let missing = |subfolder: &&str| !is_new && !path.join(subfolder).is_dir();
@@ -320,11 +318,7 @@ impl OwnedFolder {
 
     /// Waits until the names in a subfolder are on the disk: a deleted file is gone even if the power fails.
     fn sync(&self, subfolder: &str) -> io::Result<()> {
-        // Only Unix can open a folder to synchronise it.
-        if cfg!(unix) {
-            File::open(self.path.join(subfolder))?.sync_all()?;
-        }
-        Ok(())
+        File::open(self.path.join(subfolder))?.sync_all()
     }
 }
 
@@ -351,9 +345,7 @@ fn in_use(owner: &str) -> String {
 /// Creates a private folder with its parents, or makes an existing folder private.
 pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
     let mut builder = DirBuilder::new();
-    #[cfg(unix)]
-    builder.mode(FOLDER_MODE);
-    builder.recursive(true).create(folder)?;
+    builder.mode(FOLDER_MODE).recursive(true).create(folder)?;
     set_mode(folder, FOLDER_MODE);
     Ok(())
 }
@@ -361,9 +353,8 @@ pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
 /// Writes a new file that was private from its first moment.
 pub(crate) fn write_private(file: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut options = File::options();
-    #[cfg(unix)]
-    options.mode(FILE_MODE);
-    options.write(true).create_new(true).open(file)?.write_all(bytes)
+    let new = options.mode(FILE_MODE).write(true).create_new(true);
+    new.open(file)?.write_all(bytes)
 }
 
 /// Makes a file private.
@@ -373,16 +364,13 @@ fn make_private(file: &Path) {
 
 /// Sets the permissions of a file or folder. A failure is logged: a volume's own folder may belong to another user.
 fn set_mode(path: &Path, mode: u32) {
-    #[cfg(unix)]
-    {
-        let others = |about: fs::Metadata| about.permissions().mode() & !mode & 0o777 != 0;
-        let set = match fs::metadata(path).map(others) {
-            Ok(true) => fs::set_permissions(path, fs::Permissions::from_mode(mode)),
-            other => other.map(|_| ()),
-        };
-        if let Err(error) = set {
-            tracing::warn!(path = %path.display(), %error, "cannot take a file of the store from other users");
-        }
+    let others = |about: fs::Metadata| about.permissions().mode() & !mode & 0o777 != 0;
+    let set = match fs::metadata(path).map(others) {
+        Ok(true) => fs::set_permissions(path, fs::Permissions::from_mode(mode)),
+        other => other.map(|_| ()),
+    };
+    if let Err(error) = set {
+        tracing::warn!(path = %path.display(), %error, "cannot take a file of the store from other users");
     }
 }
 

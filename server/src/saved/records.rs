@@ -72,8 +72,7 @@ struct Names {
     names: Vec<String>,
 }
 
-/// The names of a message. `None` if it is not one, or has too many or too long ones: read one by one, a forged message takes no more
-/// memory than a right one.
+/// The names of a message, read one by one: a forged message takes no more memory than a right one.
 fn names_of(mut message: &[u8]) -> Option<BTreeSet<String>> {
     let mut names = BTreeSet::new();
     while !message.is_empty() {
@@ -100,7 +99,7 @@ pub(crate) struct RecordIds {
 
 /// A record could not be created.
 #[derive(Debug)]
-pub(crate) struct NotCreated {
+pub(crate) struct CreateFailure {
     /// True if nothing is left of it.
     pub is_undone: bool,
 }
@@ -154,7 +153,12 @@ impl Records {
     }
 
     /// Writes a new record, and then the names of all.
-    pub(crate) async fn create(&self, id: &str, record: Bytes, names: Vec<String>) -> Result<(), NotCreated> {
+    pub(crate) async fn create(
+        &self,
+        id: &str,
+        record: Bytes,
+        names: Vec<String>,
+    ) -> Result<(), CreateFailure> {
         let mut written = self.write(id, record).await;
         if written.is_ok() {
             written = self.write_names(names).await;
@@ -164,7 +168,7 @@ impl Records {
         // A write that failed late may have left a file, which must not come back at the next start.
         let undone = self.files.delete(&self.path(id)).await;
         let is_undone = undone.inspect_err(log_failure).is_ok();
-        Err(NotCreated { is_undone })
+        Err(CreateFailure { is_undone })
     }
 
     /// Writes the names of all other records, and then deletes this one. After an error, the record is as it was, or the next start

@@ -16,17 +16,16 @@ use tokio::{
     sync::{Semaphore, watch},
 };
 use tokio_util::sync::CancellationToken;
-use tonic::service::Routes;
 use tonic_web::GrpcWebLayer;
 use tower::{ServiceBuilder, util::option_layer};
 
-use self::parts::{calls, drain, largest_upload, logged, prepare_hands, reflection, services};
+use self::parts::{calls, drain, largest_upload, logged, prepare_hands, routes};
 use crate::{
     access::Door,
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
     config::{Config, StorePlace},
-    connect::{Connect, Transcoding},
+    connect::{Connect, Transcoder},
     error::Limit,
     executor::SearchExecutor,
     faults::FaultPoint,
@@ -34,14 +33,14 @@ use crate::{
     listen::Listener,
     middleware::Around,
     monitor::{Monitor, Phase, Vitals, set_health},
-    net::{Connections, Lifetime, Serving, UnreadCount, accept},
+    net::{ConnectionServer, Connections, Lifetime, UnreadCount, accept},
     objects::{
         derived::Resizer,
         directory::{self, DirectoryError},
         saved::SavedObjects,
         store::ObjectStore,
     },
-    reload::{Reloader, Watched, keep_current},
+    reload::{Reloader, WatchedFiles, keep_current},
     rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{Handler, Shared, load_saved_rigs, upload_places, watcher_places},
@@ -98,6 +97,8 @@ pub struct Server {
     builds: Places,
     tls: Option<Arc<Tls>>,
     door: Arc<Door>,
+    /// Certificates and tokens.
+    watched: Vec<WatchedFiles>,
     reloader: Reloader,
     monitor: Option<Listener>,
 }
@@ -169,6 +170,8 @@ impl Server {
                 ));
             }
         };
+        let mut watched = vec![WatchedFiles::new(Arc::clone(&door) as Arc<_>)];
+        watched.extend(tls.clone().map(|tls| WatchedFiles::new(tls)));
         prepare_hands();
         let directory = match &config.objects_directory {
             Some(path) => {
@@ -242,6 +245,7 @@ impl Server {
             builds,
             tls,
             door,
+            watched,
             reloader: Reloader::default(),
             monitor: None,
         })
@@ -353,12 +357,12 @@ impl Server {
             builds,
             tls,
             door,
+            watched,
             reloader,
             ..
         } = self;
         let config = &handler.config;
         let largest_upload = largest_upload(config);
-        let (grasps, objects, rigs) = services(&handler);
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, true, true).await;
         let watch = Arc::clone(&vitals).watch(handler.executor.clone(), files.clone(), health.clone());
@@ -370,12 +374,7 @@ impl Server {
         let origins = Arc::new(config.web_origins.clone());
         let is_web = *origins != WebOrigins::NONE;
         let packers = Arc::new(Semaphore::new(config.io_threads.get()));
-        let routes = Routes::new(grasps)
-            .add_service(objects)
-            .add_service(rigs)
-            .add_service(health_service)
-            .add_service(reflection().build_v1()?)
-            .add_service(reflection().build_v1alpha()?);
+        let routes = routes(&handler, health_service)?;
         let service = ServiceBuilder::new()
             .layer(Around(UnreadCount))
             .layer(refuse_origins(&origins))
@@ -387,14 +386,14 @@ impl Server {
             .layer(Around(calls(
                 &handler, &door, builds, &packers, &traces, &drained,
             )))
-            .layer(Around(Transcoding {
+            .layer(Around(Transcoder {
                 largest_upload,
                 places: packers,
             }))
-            .service(routes.prepare());
-        let serving = Serving {
+            .service(routes);
+        let server = ConnectionServer {
             service,
-            tls: tls.clone(),
+            tls,
             lifetime: Lifetime {
                 idle: config.connection_idle,
                 age: config.connection_age,
@@ -402,13 +401,11 @@ impl Server {
                 close: close.clone(),
             },
         };
-        let serving = accept(listeners, Arc::clone(&handler.connections), serving, stop.clone());
+        let serving = accept(listeners, Arc::clone(&handler.connections), server, stop.clone());
 
         // Stops all tasks, however this function ends.
         let _builders_end = handler.atlases.stopper();
         let _stop_at_the_end = stop.clone().drop_guard();
-        let mut watched = vec![Watched::new(door)];
-        watched.extend(tls.map(|tls| Watched::new(tls)));
         let shutting_down = async {
             shutdown.await;
             vitals.enter(Phase::Draining);

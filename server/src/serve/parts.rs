@@ -1,6 +1,6 @@
 //! Parts of a server: its services, the layer around calls, the built-in hands, and how it drains.
 
-use std::{path::Path, sync::Arc, thread, time::Duration};
+use std::{convert::Infallible, path::Path, sync::Arc, thread, time::Duration};
 
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1::{
@@ -8,9 +8,12 @@ use grasp_proto::v1::{
     object_service_server::ObjectServiceServer,
 };
 use grasp_synthesis::model::hand::Handedness;
+use http::{Request, Response};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
-use tonic::codec::CompressionEncoding::Gzip;
+use tonic::{Status, body::Body, codec::CompressionEncoding::Gzip, server::NamedService};
+use tonic_health::pb::health_server::{Health, HealthServer};
+use tower::{Service, service_fn, steer::Steer, util::BoxCloneSyncService};
 
 use crate::{
     access::Door,
@@ -32,8 +35,56 @@ const CALL_TIME_BEYOND_BUDGET: Duration = Duration::from_secs(20);
 /// Delay between the last response and closing its connection: time to send it, and for the client to close first.
 const LINGER: Duration = Duration::from_millis(200);
 
+/// Any service.
+type AnyService = BoxCloneSyncService<Request<Body>, Response<Body>, Infallible>;
+
+fn named<S>(service: S) -> (&'static str, AnyService)
+where
+    S: Service<Request<Body>, Response = Response<Body>, Error = Infallible, Future: Send>
+        + NamedService
+        + Clone
+        + Send
+        + Sync
+        + 'static,
+{
+    (S::NAME, BoxCloneSyncService::new(service))
+}
+
+/// All services, by the names in paths. Calls of others are answered with `UNIMPLEMENTED`.
+pub(super) fn routes(
+    handler: &Handler,
+    health: HealthServer<impl Health>,
+) -> Result<
+    impl Service<Request<Body>, Response = Response<Body>, Error = Infallible, Future: Send>
+    + Clone
+    + Send
+    + 'static,
+    tonic_reflection::server::Error,
+> {
+    let (grasps, objects, rigs) = services(handler);
+    let (names, mut services): (Vec<_>, Vec<_>) = [
+        named(grasps),
+        named(objects),
+        named(rigs),
+        named(health),
+        named(reflection().build_v1()?),
+        named(reflection().build_v1alpha()?),
+    ]
+    .into_iter()
+    .unzip();
+    let none = service_fn(async |_| Ok(Status::unimplemented("").into_http()));
+    services.push(BoxCloneSyncService::new(none));
+    let names: Arc<[&str]> = names.into();
+    let pick = move |request: &Request<Body>, _: &[AnyService]| {
+        let called = request.uri().path().split('/').nth(1);
+        let place = names.iter().position(|name| called == Some(name));
+        place.unwrap_or(names.len())
+    };
+    Ok(Steer::new(services, pick))
+}
+
 /// The services of the contract, each with the limits of its messages.
-pub(super) fn services(handler: &Handler) -> (Grasps, BySize<Objects>, BySize<Rigs>) {
+fn services(handler: &Handler) -> (Grasps, BySize<Objects>, BySize<Rigs>) {
     let largest_upload = largest_upload(&handler.config);
     let grasps = GraspServiceServer::new(handler.clone())
         .accept_compressed(Gzip)
@@ -98,7 +149,7 @@ pub(super) fn prepare_hands() {
     });
 }
 
-pub(super) fn reflection() -> tonic_reflection::server::Builder<'static> {
+fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)

@@ -296,11 +296,7 @@ impl ObjectService for Handler {
         let id = checked_id(&request.name, object_id_of)?;
         call.log_object(&id);
         let etag = given_etag(request.etag);
-        let remove = move |shared: &Shared| {
-            // No other deletion runs meanwhile.
-            shared.objects.check_owned(&id, &call.caller)?;
-            shared.objects.remove(&id, etag.as_deref())
-        };
+        let remove = move |shared: &Shared| shared.objects.remove(&id, etag.as_deref(), &call.caller);
         match self.delete_in_turn(remove).await {
             Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
             result => result?,

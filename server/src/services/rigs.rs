@@ -52,8 +52,8 @@ const REFERENCE: &str = "adult";
 const MODELS: &str = "models";
 const JOINTS: &str = "joints";
 
-/// How often rigs whose records are damaged are tried again.
-const TRIED_AGAIN_EVERY: Duration = Duration::from_secs(1);
+/// Least time between attempts to read damaged records.
+const RETRY_EVERY: Duration = Duration::from_secs(1);
 
 /// Half of the edges of the boxes for a hand of an adult's size, in metres: a bar, a remote control and a block.
 const BOXES: [Vec3; 3] = [
@@ -126,11 +126,7 @@ impl HandRigService for Handler {
     async fn delete_rig(&self, request: Request<v1::DeleteRigRequest>) -> Result<Response<()>, Status> {
         let id = checked_id(&request.get_ref().name, rig_id_of)?;
         let caller = CallContext::of(&request).caller;
-        let delete = move |shared: &Shared| {
-            // No other deletion runs meanwhile.
-            shared.rigs.check_owned(&id, &caller)?;
-            shared.rigs.delete(&id)
-        };
+        let delete = move |shared: &Shared| shared.rigs.delete(&id, &caller);
         Ok(Response::new(self.delete_in_turn(delete).await?))
     }
 }
@@ -348,7 +344,7 @@ fn prepare_rig(rig: &StoredRig) {
     }
 }
 
-/// Makes the saved rigs again, and gives their number. Damaged ones are tried again from time to time, in the background.
+/// Makes the saved rigs again, and gives their number. Damaged ones are read again when a call has met one.
 pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) -> Result<usize, StoreError> {
     let Some(saved) = rigs.saved() else {
         return Ok(0);
@@ -357,6 +353,13 @@ pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) ->
     let ids = saved.ids().await?;
     saved.adopt(&ids).await?;
     for id in ids.all {
+        if rigs.is_built_in(&id) {
+            tracing::warn!(
+                rig = name_of(&id),
+                "a saved rig is hidden by the built-in one of the same name"
+            );
+            continue;
+        }
         match saved_rig(saved, &id, limits).await? {
             Ok(rig) => {
                 rigs.check_room(&id)
@@ -375,9 +378,12 @@ pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) ->
     let rigs = Arc::downgrade(rigs);
     tokio::spawn(async move {
         while !damaged.is_empty() {
-            tokio::time::sleep(TRIED_AGAIN_EVERY).await;
+            tokio::time::sleep(RETRY_EVERY).await;
             let Some(rigs) = rigs.upgrade() else { return };
             let Some(saved) = rigs.saved() else { return };
+            if !rigs.take_damage_met() {
+                continue;
+            }
             let mut still = Vec::new();
             for id in damaged {
                 match saved_rig(saved, &id, limits).await {
@@ -385,7 +391,7 @@ pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) ->
                         rigs.add_saved(rig, true);
                     }
                     // Until it is deleted.
-                    _ if rigs.is_damaged(&name_of(&id)) => still.push(id),
+                    _ if rigs.has_damaged(&id) => still.push(id),
                     _ => {}
                 }
             }

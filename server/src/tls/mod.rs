@@ -16,6 +16,7 @@ use rustls::{
     pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject as _},
     server::{WebPkiClientVerifier, danger::ClientCertVerifier},
 };
+use uuid::Uuid;
 
 use self::certificate::expiry;
 pub(crate) use self::{
@@ -66,7 +67,7 @@ impl Tls {
         })
     }
 
-    /// What a new connection uses.
+    /// The settings of a new connection.
     pub(crate) fn config(&self) -> Arc<ServerConfig> {
         self.current().config
     }
@@ -91,7 +92,7 @@ impl Reloadable for Tls {
         required.into_iter().chain(files.client_ca.as_deref()).collect()
     }
 
-    /// Connections from now on use what is read.
+    /// Connections from now on use the new certificates.
     fn reload(&self) -> Result<(), Vec<String>> {
         let loaded = load(&self.files)?;
         *self.current.write().unwrap_or_else(PoisonError::into_inner) = loaded;
@@ -115,6 +116,22 @@ impl Reloadable for Tls {
 /// The cryptography of every connection, whatever else the program links.
 pub(crate) fn provider() -> Arc<CryptoProvider> {
     Arc::new(ring::default_provider())
+}
+
+/// Bytes that nobody can guess. `None` if the system has no randomness.
+pub(crate) fn random_bytes<const N: usize>() -> Option<[u8; N]> {
+    let mut bytes = [0; N];
+    provider().secure_random.fill(&mut bytes).ok()?;
+    Some(bytes)
+}
+
+/// An id that nobody can guess, and that no other server has.
+///
+/// # Panics
+/// The system has no randomness.
+pub(crate) fn random_id() -> Uuid {
+    let bytes = random_bytes().expect("the system has randomness");
+    uuid::Builder::from_random_bytes(bytes).into_uuid()
 }
 
 fn load(files: &TlsFiles) -> Result<Current, Vec<String>> {

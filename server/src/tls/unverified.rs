@@ -12,13 +12,13 @@ use rustls::{
 /// Takes the certificate of any server, whose name is hardly that of the loopback interface. For calls that tell no secret and
 /// whose answer is worth none.
 pub(crate) fn unverified_server() -> Arc<dyn ServerCertVerifier> {
-    Arc::new(Unverified(super::provider()))
+    Arc::new(AnyServerVerifier(super::provider()))
 }
 
 #[derive(Debug)]
-struct Unverified(Arc<CryptoProvider>);
+struct AnyServerVerifier(Arc<CryptoProvider>);
 
-impl ServerCertVerifier for Unverified {
+impl ServerCertVerifier for AnyServerVerifier {
     fn verify_server_cert(
         &self,
         _: &CertificateDer<'_>,

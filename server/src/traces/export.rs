@@ -1,4 +1,4 @@
-//! Exports spans by OTLP over gRPC. They wait for the next batch in a bounded queue; what does not fit is dropped.
+//! Exports spans by OTLP over gRPC. They wait for the next batch in a bounded queue; further ones are dropped.
 
 use std::{
     collections::HashMap,

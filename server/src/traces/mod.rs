@@ -51,7 +51,7 @@ pub(crate) struct Traces(Option<Arc<dyn Collector>>);
 trait Collector: Send + Sync {
     fn record(&self, call: &CallTrace<'_>);
 
-    /// Waits a moment for what has not been sent.
+    /// Waits a moment until the rest is sent.
     fn finish(&self);
 }
 

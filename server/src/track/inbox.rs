@@ -19,6 +19,7 @@ use crate::{
     call::CallContext,
     error::{Limit, ServiceError},
     limits::{Places, locked},
+    tls::random_id,
     validate::{Latest, TrackIntake, quoted},
 };
 
@@ -197,7 +198,7 @@ impl OpenTracks {
         inbox: Arc<Inbox>,
         answers: impl Future<Output = ()> + Send + 'static,
     ) -> String {
-        let id = Uuid::new_v4();
+        let id = random_id();
         let named = TrackName {
             tracks: Arc::clone(self),
             id,

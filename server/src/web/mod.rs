@@ -1,8 +1,8 @@
 //! Pages in browsers: who may call, how browsers learn it, and the refusal of other protocols than gRPC, gRPC-Web and Connect.
 //!
-//! gRPC-Web itself is a layer of tonic-web, and Connect the module `connect`. A browser names the page's origin with every call. Pages of other origins than those of
-//! the configuration are refused here: cross-origin rules alone would only keep them from reading the answer, and not even that
-//! once their own host name resolves to this server (DNS rebinding).
+//! gRPC-Web itself is a layer of tonic-web, and Connect the module `connect`. A browser names the page's origin with every call. Pages
+//! of other origins than those of the configuration are refused here: cross-origin rules alone would only keep them from reading the
+//! answer, and not even that once their own host name resolves to this server (DNS rebinding).
 
 mod origins;
 

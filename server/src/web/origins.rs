@@ -81,8 +81,7 @@ pub(crate) fn parse_origins(text: &str) -> Option<WebOrigins> {
     Some(WebOrigins::Some { loopback, others })
 }
 
-/// True for `scheme://host` and `scheme://host:port` in lower case, as browsers send them (RFC 6454, 6.2). Extensions have schemes
-/// of their own.
+/// True for `scheme://host` and `scheme://host:port` in lower case, as browsers send them (RFC 6454, 6.2), with any scheme.
 fn is_origin(text: &str) -> bool {
     let Some((scheme, authority)) = text.split_once("://") else {
         return false;

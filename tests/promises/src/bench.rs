@@ -82,7 +82,7 @@ impl Bench {
         self.runtime.block_on(scenarios::measure(self, scenario))
     }
 
-    /// Shows what is being measured.
+    /// Shows the current step.
     pub(crate) fn step(&self, step: impl Display) {
         self.bar.set_message(step.to_string());
     }

@@ -1,4 +1,4 @@
-//! The promises with their targets and what was measured, as a table and as JSON.
+//! The promises with their targets and figures, as a table and as JSON.
 
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use serde::Serialize;
@@ -47,7 +47,7 @@ pub(crate) enum Target {
 /// A promise and its figure.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Row {
-    /// What is promised.
+    /// The promise in words.
     pub(crate) promise: String,
     /// Its bounds.
     pub(crate) target: Target,
@@ -108,7 +108,7 @@ impl Row {
         }
     }
 
-    /// True unless a bound is missed. What could not be measured is missed.
+    /// True unless a bound is missed. A figure that could not be measured misses it.
     pub(crate) fn is_kept(&self) -> bool {
         match self.target {
             Target::AtLeast { must, .. } => self.measured >= must,

@@ -319,6 +319,10 @@ async fn clients_that_do_not_read_are_bounded_in_all_and_closed() {
             .objects
             .is_empty()
     );
+    // A call that the server cut off is none that its client cancelled.
+    let (_, metrics) = server.monitor("/metrics").await;
+    let cut_off = "ServerReflectionInfo\",grpc_code=\"Unavailable\"";
+    assert!(metrics.contains(cut_off), "{metrics}");
     drop((first, others));
     until("all to be freed", || server.gauges().unread_bytes() == 0).await;
 }

@@ -11,8 +11,8 @@ use tokio::time::Instant;
 use tonic::{Code, Status, Streaming};
 
 use crate::fixtures::{
-    assert_status, bounded, box_request, create, delete, find, floating_remote, held_remote, impossible,
-    labels, list, until, update, update_of, with, with_object,
+    assert_status, bounded, box_request, create, delete, find, floating_remote, held_remote, labels, list,
+    until, update, update_of, with, with_object,
 };
 
 async fn watch(
@@ -367,24 +367,4 @@ async fn alternatives_differ_and_the_best_comes_first() {
             .unwrap();
         assert_eq!(fewer.grasps(), grasps[..2], "{by:?}");
     }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn shutdown_ends_streams() {
-    let server = TestServer::start().await;
-    let request = every_better(impossible(&server).await.with_budget(Duration::from_secs(10)));
-    let mut messages = server
-        .grasps()
-        .await
-        .stream_grasps(request)
-        .await
-        .unwrap()
-        .into_inner();
-    until("the search", || server.gauges().searches() == 1).await;
-    let stopping = server.begin_stop();
-    let status = bounded("the end of the stream", messages.message())
-        .await
-        .unwrap_err();
-    assert_status(&status, Code::Unavailable, "SHUTTING_DOWN");
-    bounded("the end of the server", stopping.stopped()).await;
 }

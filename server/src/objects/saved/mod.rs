@@ -33,7 +33,9 @@ use crate::{
     access::Owner,
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
-    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, is_decodable, seal},
+    saved::{
+        CreateFailure, MESHES, OBJECTS, Records, SavedFiles, StoreError, Unreadable, is_decodable, seal,
+    },
     validate::{Labels, RequestKey},
     wire::hex,
 };
@@ -72,7 +74,7 @@ pub(crate) struct SavedObjects {
 
 /// The records found at the start.
 #[derive(Debug, Default)]
-pub(crate) struct Found {
+pub(crate) struct FoundRecords {
     /// The records by id, without regions and known grips; `None` if damaged or missing.
     pub objects: Vec<(String, Option<SavedObject>)>,
     pub mesh_uses: MeshUses,
@@ -101,7 +103,7 @@ impl SavedObjects {
     }
 
     /// Reads every record, and removes meshes that no record names. An error if all records or meshes are missing.
-    pub(crate) async fn read_all(&self) -> Result<Found, StoreError> {
+    pub(crate) async fn read_all(&self) -> Result<FoundRecords, StoreError> {
         let failed = |error| self.files.error(&error);
         let meshes = self.files.list(MESHES).await.map_err(failed)?;
         let ids = self.records.ids().await?;
@@ -111,7 +113,7 @@ impl SavedObjects {
         let read = ids.all.iter().cloned();
         let read = read.map(|id| async move { Ok((self.record(&id).await?, id)) });
         let mut read = futures_util::stream::iter(read).buffer_unordered(READ_AT_A_TIME);
-        let mut found = Found::default();
+        let mut found = FoundRecords::default();
         while let Some((saved, id)) = read.try_next().await.map_err(failed)? {
             let saved = saved.inspect_err(|wrong| log_damage(&id, wrong)).ok();
             if let Some(saved) = &saved {
@@ -160,10 +162,10 @@ impl SavedObjects {
         saved: &SavedObject,
         mesh: Bytes,
         names: Vec<String>,
-    ) -> Result<(), NotCreated> {
+    ) -> Result<(), CreateFailure> {
         let written = self.files.write(&mesh_path(&saved.mesh_hash()), mesh).await;
         if written.map_err(ServiceError::from).is_err() {
-            return Err(NotCreated { is_undone: true });
+            return Err(CreateFailure { is_undone: true });
         }
         self.records.create(saved.id(), seal(saved), names).await
     }

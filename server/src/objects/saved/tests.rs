@@ -135,13 +135,13 @@ fn a_mesh_is_kept_as_long_as_an_object_has_it() {
         create(&objects, id, edge).unwrap();
     }
     assert_eq!(folder.counts(), [3, 2]);
-    objects.remove("a", None).unwrap();
-    objects.remove("c", None).unwrap();
+    objects.remove("a", None, &Caller::default()).unwrap();
+    objects.remove("c", None, &Caller::default()).unwrap();
     drop(objects);
     let objects = folder.objects();
     assert_eq!(folder.counts(), [1, 1]);
     wait_for(objects.loaded("b")).unwrap();
-    objects.remove("b", None).unwrap();
+    objects.remove("b", None, &Caller::default()).unwrap();
     assert_eq!(folder.counts(), [0, 0]);
 }
 
@@ -171,7 +171,7 @@ fn more_than_the_maximum_is_refused() {
     }
     let full = create(&objects, "c", 1).map(|_| ());
     assert_eq!(full, Err(ServiceError::ObjectsFull { maximum: 2 }));
-    objects.remove("a", None).unwrap();
+    objects.remove("a", None, &Caller::default()).unwrap();
     create(&objects, "c", 1).unwrap();
 }
 
@@ -389,7 +389,7 @@ proptest! {
                     }
                 }
                 Step::Delete(id, stale) => {
-                    let deleted = objects.remove(id, stale.then_some("stale")).is_ok();
+                    let deleted = objects.remove(id, stale.then_some("stale"), &Caller::default()).is_ok();
                     prop_assert_eq!(deleted, model.contains_key(id) && !stale);
                     if deleted {
                         model.remove(id);

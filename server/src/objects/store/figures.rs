@@ -16,7 +16,7 @@ pub(crate) struct StoreFigures {
     pub at_rest: usize,
     /// Created ones whose record could not be read.
     pub damaged: usize,
-    /// Memory for created objects and what is made from them, by estimate.
+    /// Memory for created objects and their derived data, by estimate.
     pub bytes: usize,
     pub most_bytes: usize,
 }

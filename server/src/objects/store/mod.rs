@@ -17,7 +17,7 @@ mod watching;
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard},
     time::{Duration, SystemTime},
 };
 
@@ -39,8 +39,8 @@ use super::{
 use crate::{
     access::{Caller, Owner},
     error::ServiceError,
-    limits::StoreLimits,
-    saved::{NotCreated, wait_for},
+    limits::{StoreLimits, locked},
+    saved::{CreateFailure, wait_for},
     validate::{Labels, PageQuery, RequestKey},
 };
 
@@ -226,7 +226,7 @@ impl ObjectStore {
         let mut ids = self.ids();
         ids.push(object.id.clone());
         let created = wait_for(saved.create(&record, mesh, ids));
-        if let Err(NotCreated { is_undone }) = created {
+        if let Err(CreateFailure { is_undone }) = created {
             if is_undone {
                 self.forget_mesh(mesh_uses, &hash);
             }
@@ -251,13 +251,6 @@ impl ObjectStore {
                 wait_for(saved.delete_mesh(hash));
             }
         }
-    }
-
-    /// Checks that an object, if it exists, does not belong to another client.
-    pub(crate) fn check_owned(&self, id: &str, caller: &Caller) -> Result<(), ServiceError> {
-        let created = self.created();
-        let owner = created.objects.get(id).map(|entry| &entry.state.record.owner);
-        owner.map_or(Ok(()), |owner| caller.check_owns(&name_of(id), owner))
     }
 
     /// The object with this id if a client may change it and it has the given etag.
@@ -338,10 +331,18 @@ impl ObjectStore {
         })
     }
 
-    pub(crate) fn remove(&self, id: &str, etag: Option<&str>) -> Result<(), ServiceError> {
+    /// Removes an object of the caller or of everybody.
+    ///
+    /// # Errors
+    /// Those of [`Self::changeable`], and [`ServiceError::NotOwner`].
+    pub(crate) fn remove(&self, id: &str, etag: Option<&str>, caller: &Caller) -> Result<(), ServiceError> {
         self.check_changeable(id)?;
         let mut mesh_uses = self.changing();
-        let mesh = self.created().entry_with(id, etag)?.mesh;
+        let mesh = {
+            let mut created = self.created();
+            caller.check_owns(&name_of(id), &created.entry(id)?.state.record.owner)?;
+            created.entry_with(id, etag)?.mesh
+        };
         if let Some(saved) = &self.saved {
             let mut others = self.ids();
             others.retain(|other| other != id);
@@ -384,14 +385,12 @@ impl ObjectStore {
     }
 
     fn created(&self) -> MutexGuard<'_, Created> {
-        // No code panics while it holds the lock; if some did, the map would still be consistent.
-        self.created.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.created)
     }
 
     /// Waits until no other call adds, changes or deletes an object, and keeps them waiting.
     fn changing(&self) -> MutexGuard<'_, MeshUses> {
-        // No code panics while it holds the lock; if some did, a mesh might be kept in vain.
-        self.mesh_uses.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.mesh_uses)
     }
 }
 

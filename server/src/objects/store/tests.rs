@@ -9,6 +9,7 @@ use super::{
     *,
 };
 use crate::{
+    access::Caller,
     objects::{Derived, derived::ObjectSize, tests::tetrahedron},
     validate::{RequestedSize, page_query},
 };
@@ -130,7 +131,7 @@ fn a_repeated_request_finds_its_object() {
     let exists = create("a", 2, 1).unwrap_err();
     assert!(matches!(exists, ServiceError::ObjectExists { .. }), "{exists}");
     // Forgotten with the object, whether that is deleted or evicted.
-    store.remove("a", None).unwrap();
+    store.remove("a", None, &Caller::default()).unwrap();
     create("a", 1, 3).unwrap();
     for id in ["b", "c"] {
         insert(&store, id).unwrap();
@@ -225,7 +226,9 @@ fn derived_data_is_built_once_and_counts_until_it_is_dropped() {
     assert!(Arc::ptr_eq(&first, &second));
     assert_eq!(store.created().taken(), at_rest + first.bytes());
     drop((first, second));
-    store.remove(&a.id, None).expect("it is there");
+    store
+        .remove(&a.id, None, &Caller::default())
+        .expect("it is there");
     assert_eq!(store.created().taken(), 0);
 }
 
@@ -306,7 +309,7 @@ fn sizes_count_and_make_room_before_objects_do() {
     assert!(store.contains("a") && store.contains("b"));
     assert_eq!(taken(), 2 * at_rest + sized);
     // All data of an object goes with it.
-    store.remove("a", None).unwrap();
+    store.remove("a", None, &Caller::default()).unwrap();
     assert_eq!(taken(), at_rest);
 }
 

@@ -7,7 +7,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     ops::Bound,
-    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
+    sync::{Arc, Mutex, MutexGuard, Weak},
 };
 
 use grasp_synthesis::model::hand::Handedness;
@@ -16,6 +16,7 @@ use tokio::sync::Notify;
 use super::{Created, ObjectStore};
 use crate::{
     error::ServiceError,
+    limits::locked,
     objects::{Listed, StoredObject},
     validate::{Labels, ObjectFilter, WatchQuery},
 };
@@ -101,8 +102,7 @@ impl Watcher {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // No code panics while it holds the lock; if some did, the state would still be consistent.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.state)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Attacks on the transport: how soon another client is answered beside each, what becomes of the attacker, and the memory that it takes.
+//! Attacks on the transport: how soon another client is answered beside each, the attacker's fate, and the memory that it takes.
 
 use std::time::{Duration, Instant};
 

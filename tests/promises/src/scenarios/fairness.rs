@@ -13,19 +13,19 @@ use crate::{
     server::ServerProcess,
 };
 
-/// Least share of what the light client has alone, and the aim.
+/// Least share of the light client's goodput alone, and the aim.
 const OF_SOLO: [f64; 2] = [0.9, 0.95];
 
 /// The light client's searches, as a share of saturation.
 const LIGHT_SHARE: f64 = 0.2;
 
-/// Time between the light client's uses of what the heavy one takes.
+/// Time between the light client's uses of the contested resource.
 const PROBE_EVERY: Duration = Duration::from_millis(200);
 
-/// Time for the heavy client to take what it can get.
+/// Time for the heavy client to take all it can get.
 const TAKES: Duration = Duration::from_millis(500);
 
-/// What the heavy client takes.
+/// A resource that the heavy client takes.
 #[derive(Clone, Copy, Debug)]
 enum Resource {
     /// Searches at ten times saturation.

@@ -20,7 +20,7 @@ use crate::{Failure, bench::Bench, report::Row};
 pub(crate) enum Scenario {
     /// Answers in time at several times the load that the server can take, and admitted calls that are late.
     Goodput,
-    /// How soon calls are refused, and what a refusal costs.
+    /// How soon calls are refused, and the cost of a refusal.
     Refusals,
     /// How long after an overload calls are answered as before.
     Recovery,

@@ -1,4 +1,4 @@
-//! Refusals: how soon calls beyond what the server can take are refused, and what that costs.
+//! Refusals: how soon calls beyond the server's capacity are refused, and the cost.
 
 use std::time::Duration;
 

@@ -105,17 +105,6 @@ async fn a_track_ends_at_its_deadline() {
     assert_eq!(status.code(), Code::DeadlineExceeded, "{status:?}");
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn tracks_end_with_unavailable_at_shutdown() {
-    let server = TestServer::start_with(|config| config.drain = Duration::from_hours(1)).await;
-    let mut track = Tracked::remote(&server).await;
-    track.ask(frame(0, swaying(0))).await;
-    let stopping = server.begin_stop();
-    let status = track.next().await.unwrap_err();
-    assert_status(&status, Code::Unavailable, "SHUTTING_DOWN");
-    bounded("the shutdown", stopping.stopped()).await;
-}
-
 /// Largest number of answers by which the server may be ahead of the reader.
 const FEW: usize = 6;
 

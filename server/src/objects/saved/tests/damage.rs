@@ -30,7 +30,10 @@ fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back_o
         assert_eq!(objects.get("a").map(|_| ()), Err(damaged("a")));
         assert_eq!(wait_for(objects.found("a")).map(|_| ()), Err(damaged("a")));
         assert_eq!(objects.changeable("a", None).map(|_| ()), Err(damaged("a")));
-        assert_eq!(objects.remove("a", Some("1-1")), Err(damaged("a")));
+        assert_eq!(
+            objects.remove("a", Some("1-1"), &Caller::default()),
+            Err(damaged("a"))
+        );
         // Its name and its mesh are kept.
         let exists = ServiceError::ObjectExists { name: name_of("a") };
         assert_eq!(create(&objects, "a", 3).map(|_| ()), Err(exists));
@@ -42,7 +45,7 @@ fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back_o
         wait_for(objects.loaded("a")).unwrap();
     }
     fs::write(&path, "not a record").unwrap();
-    folder.objects().remove("a", None).unwrap();
+    folder.objects().remove("a", None, &Caller::default()).unwrap();
     let objects = folder.objects();
     let gone = objects.get("a").unwrap_err();
     assert!(matches!(gone, ServiceError::ObjectNotFound { .. }), "{gone}");
@@ -76,7 +79,7 @@ fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
     // Created again, it is whole.
     fs::remove_file(&path).unwrap();
     let objects = folder.objects();
-    objects.remove("a", None).unwrap();
+    objects.remove("a", None, &Caller::default()).unwrap();
     create(&objects, "a", 1).unwrap();
     drop(objects);
     wait_for(folder.objects().loaded("a")).unwrap();
@@ -109,7 +112,6 @@ fn a_store_without_all_of_its_meshes_or_records_is_refused_and_left_as_it_is() {
     }
 }
 
-#[cfg(unix)]
 #[test]
 fn folders_and_files_are_private_to_their_user() {
     use std::os::unix::fs::PermissionsExt as _;
@@ -157,7 +159,7 @@ fn changing_an_object_that_is_being_deleted_is_no_damage() {
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 let _context = RUNTIME.enter();
-                objects.remove("a", None).unwrap();
+                objects.remove("a", None, &Caller::default()).unwrap();
             });
             for _ in 0..3 {
                 for result in [

@@ -1,4 +1,4 @@
-//! The light client's own uses of what the heavy one takes.
+//! The light client's own uses of the contested resource.
 
 use std::{
     fmt,
