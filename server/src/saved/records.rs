@@ -7,7 +7,7 @@ use std::{
 };
 
 use bytes::Bytes;
-use grasp_proto::has_too_many_parts;
+use grasp_proto::is_too_large_decoded;
 use object_store::{Error, path::Path};
 use prost::{Message, Name, decode_length_delimiter, encode_length_delimiter};
 use sha2::{Digest as _, Sha256};
@@ -270,7 +270,7 @@ pub(crate) fn is_decodable<M: Name>(record: &[u8], number: usize) -> bool {
     let mut contents = contents(record, number);
     let is_small = contents
         .next()
-        .is_none_or(|content| !has_too_many_parts::<M>(content));
+        .is_none_or(|content| !is_too_large_decoded::<M>(content));
     is_small && contents.next().is_none()
 }
 
