@@ -10,6 +10,8 @@ use std::{fmt, sync::Arc, time::Duration};
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
+#[cfg(fuzzing)]
+pub(crate) use self::tokens::Tokens;
 pub use self::tokens::new_token;
 pub(crate) use self::{door::Door, tokens::Quotas};
 use crate::error::{Quota, ServiceError};

@@ -71,7 +71,7 @@ fn is_false(value: &bool) -> bool {
 
 /// The clients of a file.
 #[derive(Debug, Default)]
-pub(super) struct Tokens {
+pub(crate) struct Tokens {
     by_hash: Vec<(Hash, Arc<Identity>)>,
     by_certificate: BTreeMap<Arc<str>, Arc<Identity>>,
 }
@@ -85,7 +85,7 @@ impl Tokens {
         Self::parse(&text).map_err(|problems| problems.iter().map(|problem| wrong(problem)).collect())
     }
 
-    fn parse(text: &str) -> Result<Self, Vec<String>> {
+    pub(crate) fn parse(text: &str) -> Result<Self, Vec<String>> {
         let entries: BTreeMap<String, Entry> =
             toml::from_str(text).map_err(|error| vec![error.to_string()])?;
         let mut problems = Vec::new();

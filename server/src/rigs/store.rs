@@ -310,7 +310,8 @@ const LIMITS: &[FieldMove] = &[
     field(5, &[1]),
 ];
 
-fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
+/// The request in a record of this or the last version.
+pub(crate) fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
     if !is_decodable::<v1::CreateRigRequest>(record, NOW) {
         return None;
     }

@@ -28,6 +28,8 @@ use object_store::{
 };
 
 use self::lease::Lease;
+#[cfg(fuzzing)]
+pub(crate) use self::records::names_of;
 pub(crate) use self::records::{
     FieldMove, NotCreated, Records, Unreadable, field, is_decodable, message, move_fields, seal,
 };

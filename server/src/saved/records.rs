@@ -74,7 +74,7 @@ struct Names {
 
 /// The names of a message. `None` if it is not one, or has too many or too long ones: read one by one, a forged message takes no more
 /// memory than a right one.
-fn names_of(mut message: &[u8]) -> Option<BTreeSet<String>> {
+pub(crate) fn names_of(mut message: &[u8]) -> Option<BTreeSet<String>> {
     let mut names = BTreeSet::new();
     while !message.is_empty() {
         let field = take_field(&mut message)?;

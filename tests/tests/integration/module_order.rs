@@ -48,7 +48,7 @@ const SERVER: &[&[&str]] = &[
     &["search"],
     &["services"],
     &["monitor"],
-    &["serve"],
+    &["fuzzing", "serve"],
 ];
 
 /// The core's layers, as documented in its `lib.rs`.
