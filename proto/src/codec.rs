@@ -11,11 +11,11 @@ use tonic::{
     codec::{Codec, DecodeBuf, Decoder, EncodeBuf, Encoder},
 };
 
-use crate::parts::{MAX_PARTS, has_too_many_parts, is_request};
+use crate::parts::{MAX_DECODED_BESIDES, is_request, is_too_large_decoded};
 
 /// Encodes the same bytes as `tonic_prost::ProstCodec`, but from and into plain slices: prost accesses its buffer once
-/// per number, and with gRPC's buffers each access costs more than the number itself. Requests of more than [`MAX_PARTS`] parts are
-/// refused before they are decoded; answers come from a server that the client has chosen.
+/// per number, and with gRPC's buffers each access costs more than the number itself. Requests that would take too much
+/// memory are refused before they are decoded; answers come from a server that the client has chosen.
 #[derive(Debug)]
 pub struct SliceCodec<T, U>(PhantomData<(T, U)>);
 
@@ -63,12 +63,53 @@ impl<T, U: Message + Name + Default> Decoder for SliceCodec<T, U> {
 
     fn decode(&mut self, buffer: &mut DecodeBuf<'_>) -> Result<Option<U>, Status> {
         let bytes = buffer.copy_to_bytes(buffer.remaining());
-        if is_request::<U>() && has_too_many_parts::<U>(&bytes) {
-            let problem = format!("it has more than {MAX_PARTS} messages, texts and lists");
-            return Err(Status::internal(problem));
-        }
-        // gRPC assigns INTERNAL to messages that cannot be decoded.
-        let message = U::decode(&*bytes).map_err(|error| Status::internal(error.to_string()))?;
-        Ok(Some(message))
+        decoded(&bytes).map(Some)
+    }
+}
+
+/// A received message.
+///
+/// # Errors
+/// The bytes are not this message, or it is a request that would take too much memory.
+pub fn decoded<M: Message + Name + Default>(bytes: &[u8]) -> Result<M, Status> {
+    if is_request::<M>() && is_too_large_decoded::<M>(bytes) {
+        let problem = format!(
+            "it takes more memory than {} KiB and twice its bytes, meshes aside; send fewer messages, texts or numbers",
+            MAX_DECODED_BESIDES >> 10
+        );
+        return Err(Status::internal(problem));
+    }
+    // gRPC assigns INTERNAL to messages that cannot be decoded.
+    M::decode(bytes).map_err(|error| Status::internal(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::v1;
+
+    const MANY: usize = 16_384;
+
+    #[test]
+    fn what_clients_send_is_bounded_in_memory_and_what_servers_answer_is_not() {
+        let holdout = v1::Holdout {
+            obstacles: vec![v1::Shape::default(); MANY],
+            ..v1::Holdout::new("objects/mug")
+        };
+        let frame = v1::TrackFrame::of(1, holdout.clone());
+        assert!(decoded::<v1::TrackFrame>(&frame.encode_to_vec()).is_err());
+        let track = v1::Track {
+            holdout: Some(holdout),
+            ..Default::default()
+        };
+        assert!(decoded::<v1::Track>(&track.encode_to_vec()).is_err());
+        let answer = v1::FindGraspResponse {
+            grasps: vec![v1::Grasp::default(); MANY],
+            ..Default::default()
+        };
+        assert_eq!(
+            decoded::<v1::FindGraspResponse>(&answer.encode_to_vec()).unwrap(),
+            answer
+        );
     }
 }

@@ -10,7 +10,7 @@ mod requests;
 mod values;
 
 pub use packed::PackedGraspError;
-pub use parts::{MAX_PARTS, has_too_many_parts};
+pub use parts::{MAX_DECODED_BESIDES, is_too_large_decoded};
 pub use values::{JOINT_COUNT, code_name, std_duration, wire_duration};
 
 /// Messages, clients and servers of package `grasp.v1`.

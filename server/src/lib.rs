@@ -40,7 +40,7 @@
 //! search
 //! services
 //! monitor
-//! serve
+//! fuzzing  serve
 //! ```
 //!
 //! The algorithm is in the crate `grasp-synthesis`, which knows nothing of gRPC or async code. Only `convention` knows
@@ -60,6 +60,8 @@ mod convention;
 mod error;
 mod executor;
 mod faults;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod health_check;
 mod limits;
 mod listen;

@@ -59,8 +59,8 @@ struct Scanner {
     coloured: Occurrences,
     /// Vertices with a weight other than 1.
     weighted: Occurrences,
-    /// The lines of corners that refer to vertices further down, and the indices of these, counted from 1.
-    forward: Vec<(usize, i64)>,
+    /// True if a corner refers to a vertex further down.
+    looks_ahead: bool,
     groups: Vec<u32>,
     object: Option<u32>,
     material: Option<u32>,
@@ -82,7 +82,7 @@ impl Scanner {
             if let Err(over_limit) = self.line(number, &line, unit_metres, limits) {
                 // The rest of the text is unknown.
                 self.violations.push(over_limit);
-                self.forward.clear();
+                self.looks_ahead = false;
                 break;
             }
         }
@@ -213,7 +213,7 @@ impl Scanner {
         let vertex = vertex.ok_or_else(|| no_such_vertex(line, index, known))?;
         match self.is_used.get_mut(vertex) {
             Some(is_used) => *is_used = true,
-            None => self.forward.push((line, index)),
+            None => self.looks_ahead = true,
         }
         // Writing to a string cannot fail.
         _ = write!(self.faces, " {}", vertex + 1);
@@ -236,13 +236,27 @@ impl Scanner {
         (!name.is_empty()).then(|| self.raw.names.intern(&name))
     }
 
-    fn finish(mut self, stop: Stop<'_>) -> Result<RawMesh, Violations> {
+    /// Checks all corners once the vertices are known. Their indices are in the text already: a list of those further down would take
+    /// several times the memory.
+    fn look_ahead(&mut self) {
         let known = self.is_used.len();
-        for (line, index) in self.forward {
-            match self.is_used.get_mut(index as usize - 1) {
-                Some(is_used) => *is_used = true,
-                None => self.violations.push(no_such_vertex(line, index, known)),
+        let faces = self.faces.lines().filter_map(|line| line.strip_prefix('f'));
+        for (face, corners) in self.raw.faces.iter().zip(faces) {
+            let corners = corners.split_ascii_whitespace();
+            for index in corners.filter_map(|index| index.parse().ok()) {
+                if let Some(is_used) = self.is_used.get_mut(index as usize - 1) {
+                    *is_used = true;
+                } else {
+                    let wrong = no_such_vertex(face.place as usize, index, known);
+                    self.violations.push(wrong);
+                }
             }
+        }
+    }
+
+    fn finish(mut self, stop: Stop<'_>) -> Result<RawMesh, Violations> {
+        if self.looks_ahead {
+            self.look_ahead();
         }
         self.violations.into_result()?;
         let mut raw = self.raw;

@@ -15,6 +15,8 @@ use std::{
     time::Duration,
 };
 
+#[cfg(fuzzing)]
+pub(crate) use self::tokens::Tokens;
 pub use self::tokens::new_token;
 pub(crate) use self::{door::Door, tokens::Quotas};
 use crate::error::{Quota, ServiceError};

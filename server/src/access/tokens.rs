@@ -70,7 +70,7 @@ fn is_false(value: &bool) -> bool {
 
 /// The clients of a file.
 #[derive(Debug, Default)]
-pub(super) struct Tokens {
+pub(crate) struct Tokens {
     by_hash: Vec<(Hash, Arc<Identity>)>,
     by_name: BTreeMap<Arc<str>, Arc<Identity>>,
 }
@@ -84,7 +84,7 @@ impl Tokens {
         Self::parse(&text, before).map_err(|problems| problems.iter().map(|problem| wrong(problem)).collect())
     }
 
-    fn parse(text: &str, before: &Self) -> Result<Self, Vec<String>> {
+    pub(crate) fn parse(text: &str, before: &Self) -> Result<Self, Vec<String>> {
         let entries: BTreeMap<String, Entry> = toml::from_str(text).map_err(|error| {
             // Not the whole error, which quotes a line that may have a secret.
             let before = text

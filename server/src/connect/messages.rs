@@ -15,6 +15,7 @@ use flate2::read::MultiGzDecoder;
 use grasp_proto::json::{bytes_of, text_of};
 use http::{Request, Response};
 use http_body::Frame;
+use prost_reflect::MessageDescriptor;
 use tokio::{sync::Semaphore, task::JoinHandle};
 use tonic::{Status, body::Body};
 
@@ -42,7 +43,7 @@ const LARGE: usize = 32 << 10;
 const JSON_GROWTH: usize = 5;
 
 /// Least bytes of protobuf per value in JSON, on average and besides the mesh; values take tens of bytes while they are converted.
-const BYTES_OF_VALUE: usize = 2;
+pub(crate) const BYTES_OF_VALUE: usize = 2;
 
 /// The layer inside that of calls; see the module documentation.
 #[derive(Clone, Debug)]
@@ -269,12 +270,16 @@ fn read(call: &Call, message: Bytes, packed: bool, limits: MessageLimits) -> Res
         message = unpacked(&message, limits.bytes)?;
     }
     if call.format.json {
-        message = protobuf(call, &message, limits.values)?.into();
+        message = protobuf(&call.method.input(), &message, limits.values)?.into();
     }
     Ok(framed(&message))
 }
 
-fn protobuf(call: &Call, text: &[u8], most_values: usize) -> Result<Vec<u8>, ServiceError> {
+pub(crate) fn protobuf(
+    message: &MessageDescriptor,
+    text: &[u8],
+    most_values: usize,
+) -> Result<Vec<u8>, ServiceError> {
     if text.trim_ascii().is_empty() {
         return Err(ServiceError::invalid(
             BODY,
@@ -285,7 +290,7 @@ fn protobuf(call: &Call, text: &[u8], most_values: usize) -> Result<Vec<u8>, Ser
         let problem = format!("has {} values; it may have {most_values}", values(text));
         return Err(ServiceError::invalid(BODY, problem));
     }
-    bytes_of(&call.method.input(), text)
+    bytes_of(message, text)
         .map_err(|error| ServiceError::invalid(error.path.unwrap_or_else(|| BODY.to_owned()), error.problem))
 }
 

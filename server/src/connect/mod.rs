@@ -15,6 +15,8 @@ use http::{Request, Response, Version};
 use tonic::body::Body;
 
 pub(crate) use self::messages::Transcoder;
+#[cfg(fuzzing)]
+pub(crate) use self::messages::{BYTES_OF_VALUE, protobuf};
 use self::{answers::answered, requests::call};
 use crate::middleware::{Answer, Middleware};
 

@@ -13,7 +13,7 @@ use std::{
 use bytes::Bytes;
 use grasp_admission::may_hold_another;
 use grasp_assets::hands::{self, RIG_NAMES};
-use grasp_proto::{has_too_many_parts, v1};
+use grasp_proto::{is_too_large_decoded, v1};
 use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 use object_store::Error;
 use prost::Message;
@@ -329,7 +329,8 @@ const LIMITS: &[FieldMove] = &[
     field(5, &[1]),
 ];
 
-fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
+/// The request in a record of this or the last version.
+pub(crate) fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
     if !is_decodable::<v1::CreateRigRequest>(record, NOW) {
         return None;
     }
@@ -337,7 +338,7 @@ fn request_of(record: &[u8]) -> Option<v1::CreateRigRequest> {
         return Some(request);
     }
     let request = move_fields(record, REQUEST)
-        .filter(|request| !has_too_many_parts::<v1::CreateRigRequest>(request))?;
+        .filter(|request| !is_too_large_decoded::<v1::CreateRigRequest>(request))?;
     let mut request = v1::CreateRigRequest::decode(&*request).ok()?;
     for (place, limits) in (1..).zip(&mut request.limits) {
         if limits.digit == 0 {

@@ -27,6 +27,8 @@ use object_store::{
 };
 
 use self::lease::Lease;
+#[cfg(fuzzing)]
+pub(crate) use self::records::names_of;
 pub(crate) use self::records::{
     CreateFailure, FieldMove, Records, Unreadable, field, is_decodable, message, move_fields, seal,
 };

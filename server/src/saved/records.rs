@@ -7,7 +7,7 @@ use std::{
 };
 
 use bytes::Bytes;
-use grasp_proto::has_too_many_parts;
+use grasp_proto::is_too_large_decoded;
 use object_store::{Error, path::Path};
 use prost::{Message, Name, decode_length_delimiter, encode_length_delimiter};
 use sha2::{Digest as _, Sha256};
@@ -73,7 +73,7 @@ struct Names {
 }
 
 /// The names of a message, read one by one: a forged message takes no more memory than a right one.
-fn names_of(mut message: &[u8]) -> Option<BTreeSet<String>> {
+pub(crate) fn names_of(mut message: &[u8]) -> Option<BTreeSet<String>> {
     let mut names = BTreeSet::new();
     while !message.is_empty() {
         let field = take_field(&mut message)?;
@@ -274,7 +274,7 @@ pub(crate) fn is_decodable<M: Name>(record: &[u8], number: usize) -> bool {
     let mut contents = contents(record, number);
     let is_small = contents
         .next()
-        .is_none_or(|content| !has_too_many_parts::<M>(content));
+        .is_none_or(|content| !is_too_large_decoded::<M>(content));
     is_small && contents.next().is_none()
 }
 

@@ -19,6 +19,8 @@ use std::{
 use tokio::sync::{Semaphore, watch};
 use tokio_util::sync::CancellationToken;
 
+#[cfg(fuzzing)]
+pub(crate) use self::rigs::build_rig;
 pub(crate) use self::{
     object_streams::{upload_places, watcher_places},
     rigs::load_saved_rigs,

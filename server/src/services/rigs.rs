@@ -200,7 +200,7 @@ fn wire_limits(digit: Digit, limits: &DigitLimits) -> v1::DigitLimits {
     }
 }
 
-fn build_rig(
+pub(crate) fn build_rig(
     fields: RigFields,
     owner: Owner,
     limits: MeshLimits,

@@ -49,7 +49,7 @@ fn bombs() -> Vec<Bomb> {
     // An object of empty known grips, the contract's largest message, and a rig of empty models.
     let grips = within(1, &b"\x42\0".repeat(4 * MIB));
     let models = b"\x12\0".repeat(4 * MIB);
-    let hands = within(2, &b"\x32\0".repeat(75_000));
+    let hands = within(1, &b"\x22\0".repeat(75_000));
     vec![
         bomb("empty grips", CREATE_OBJECT, proto, grips),
         bomb("empty models", "HandRigService/CreateRig", proto, models),

@@ -53,7 +53,7 @@ const PLACEHOLDER_MASS: f32 = 1.0;
 
 /// Reads the manifest of the object with this id key by key, to report all problems at once. Its values are not checked.
 /// `None` if it is not TOML.
-pub(super) fn read_manifest(id: &str, bytes: &[u8], violations: &Violations) -> Option<v1::GraspObject> {
+pub(crate) fn read_manifest(id: &str, bytes: &[u8], violations: &Violations) -> Option<v1::GraspObject> {
     let whole = violations.field("");
     let text = std::str::from_utf8(bytes);
     let text = text

@@ -24,7 +24,7 @@ use grasp_synthesis::{
     model::hand::{Handedness, rig::Rig},
 };
 
-use self::manifest::read_manifest;
+pub(crate) use self::manifest::read_manifest;
 use super::{StoredObject, build::build_object, given::check_grips, store::is_built_in};
 use crate::{
     error::{ServiceError, Violation},

@@ -325,7 +325,7 @@ impl SavedObject {
     }
 
     /// The record of the object with this id.
-    fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
+    pub(crate) fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
         if !is_decodable::<v1::GraspObject>(message, OBJECT) {
             return Err(Unreadable::Message);
         }

@@ -1,6 +1,6 @@
 //! Records of version 0.1, which are read, but not written: most of their fields have other numbers.
 
-use grasp_proto::{has_too_many_parts, v1};
+use grasp_proto::{is_too_large_decoded, v1};
 use prost::Message;
 
 use crate::{
@@ -124,7 +124,7 @@ struct Origin {
 pub(super) fn read(record: &[u8]) -> Option<(v1::GraspObject, Option<v1::Vector3>)> {
     let OldRecord { given, found } = OldRecord::decode(record).ok()?;
     let object =
-        move_fields(record, OBJECT).filter(|object| !has_too_many_parts::<v1::GraspObject>(object))?;
+        move_fields(record, OBJECT).filter(|object| !is_too_large_decoded::<v1::GraspObject>(object))?;
     let mut object = v1::GraspObject::decode(&*object).ok()?;
     object.name = name_of(&object.name);
     object.meters_per_unit.get_or_insert(1.0);
