@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn memory_is_counted_where_the_contract_has_parts_and_nowhere_else() {
-        assert!(!is_refused(&request(1000, Vec::new())));
+        assert!(!is_refused(&request(500, Vec::new())));
         assert!(is_refused(&request(3000, Vec::new())));
         // A mesh makes no room.
         assert!(is_refused(&request(3000, vec![0; 1 << 20])));
