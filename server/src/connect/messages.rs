@@ -1,7 +1,7 @@
 //! The messages of calls over Connect: those of requests as gRPC's frames of protobuf, those of answers as JSON.
 //!
-//! Reading and writing JSON takes some 10 µs per kilobyte. Large messages are converted on other threads, as many as there are places;
-//! one that finds no place is converted at once.
+//! Reading and writing JSON takes some 10 µs per kilobyte. Large messages are converted on other threads, as many as there are places,
+//! for which they wait.
 
 use std::{
     io::Read as _,
@@ -16,13 +16,15 @@ use grasp_proto::json::{bytes_of, text_of};
 use http::{Request, Response};
 use http_body::Frame;
 use prost_reflect::MessageDescriptor;
-use tokio::{sync::Semaphore, task::JoinHandle};
+use tokio::sync::Semaphore;
+use tokio_util::task::AbortOnDropHandle;
 use tonic::{Status, body::Body};
 
 use super::requests::Call;
 use crate::{
     call::{FramedMessages, is_upload},
     error::ServiceError,
+    executor::run_blocking,
     limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST},
     middleware::{Answer, FrameFilter, Middleware, PolledFrame, filtered, next_frame},
 };
@@ -108,7 +110,7 @@ impl Middleware<Body> for Transcoder {
 
 /// Converts one message after the other.
 struct Converter {
-    running: Option<JoinHandle<Result<Bytes, ServiceError>>>,
+    running: Option<AbortOnDropHandle<Result<Bytes, ServiceError>>>,
     places: Arc<Semaphore>,
 }
 
@@ -126,14 +128,20 @@ impl Converter {
         bytes: usize,
         convert: impl FnOnce() -> Result<Bytes, ServiceError> + Send + 'static,
     ) -> Option<Result<Bytes, ServiceError>> {
-        let place = (bytes >= LARGE).then(|| Arc::clone(&self.places).try_acquire_owned());
-        let Some(Ok(place)) = place else {
+        if bytes < LARGE {
             return Some(convert());
-        };
-        self.running = Some(tokio::task::spawn_blocking(move || {
-            let _place = place;
-            convert()
-        }));
+        }
+        let places = Arc::clone(&self.places);
+        self.running = Some(AbortOnDropHandle::new(tokio::spawn(async move {
+            // Nothing closes the semaphore.
+            let place = places.acquire_owned().await;
+            run_blocking(move || {
+                let _place = place;
+                convert()
+            })
+            .await
+            .flatten()
+        })));
         None
     }
 
