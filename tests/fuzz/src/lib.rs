@@ -5,7 +5,8 @@ mod requests;
 
 use std::{env, fmt, fs, path::PathBuf, sync::Mutex, time::Duration};
 
-use grasp_import::{Import, MeshLimits};
+use grasp_import::Import;
+use grasp_server::fuzzing::MESH_LIMITS;
 use peak_alloc::PeakAlloc;
 use rustix::time::{ClockId, clock_gettime};
 
@@ -47,13 +48,6 @@ pub struct Target {
 
 /// Inputs of [`Target::dense`] have about so many bytes.
 pub const DENSE_BYTES: usize = 1 << 20;
-
-/// Bounds of meshes that the server has by default.
-pub const MESH_LIMITS: MeshLimits = MeshLimits {
-    bytes: 64 << 20,
-    vertices: 200_000,
-    triangles: 200_000,
-};
 
 /// Reads a mesh of any format.
 pub fn read_mesh(input: &[u8]) {

@@ -18,16 +18,18 @@ fn read(input: &[u8]) {
     }
 }
 
-/// A message with as many copies of the encoded field as a request may have bytes.
-fn repeated(name: &str, outer: u8, field: &[u8]) -> Vec<u8> {
+/// Messages with an encoded field that takes much memory many times: some are refused, and some just not.
+fn repeated(name: &str, outer: u8, field: &[u8]) -> impl Iterator<Item = Vec<u8>> {
     let place = request_names()
         .position(|known| known == name)
         .expect("it is a request");
-    let content = field.repeat((160 << 10) / field.len() - 4);
-    let mut message = vec![place as u8, outer << 3 | 2];
-    prost::encode_length_delimiter(content.len(), &mut message).expect("there is room");
-    message.extend(content);
-    message
+    (6..14).map(move |power| {
+        let content = field.repeat(3 << power);
+        let mut message = vec![place as u8, outer << 3 | 2];
+        prost::encode_length_delimiter(content.len(), &mut message).expect("there is room");
+        message.extend(content);
+        message
+    })
 }
 
 fuzz!(Target {
@@ -45,15 +47,26 @@ fuzz!(Target {
         seeds.push([vec![request_names().count() as u8], grasp.pack()].concat());
         seeds
     },
-    dense: || vec![
-        repeated("FindGraspRequest", 1, b"\x2a\0"),
-        repeated("FindGraspRequest", 1, b"\x22\0"),
-        repeated("TrackFrame", 4, b"\x2a\0"),
-        repeated("TrackFrame", 4, b"\x22\0"),
-        repeated("CreateObjectRequest", 1, b"\x3a\0"),
-        repeated("CreateObjectRequest", 1, b"\x42\0"),
-        repeated("CreateObjectRequest", 1, b"\x1a\0"),
-    ],
+    dense: || {
+        let fields: [(&str, u8, &[u8]); 9] = [
+            // Hands, and ones of one joint.
+            ("FindGraspRequest", 1, b"\x22\0"),
+            ("FindGraspRequest", 1, b"\x22\x04\x12\x02\x12\0"),
+            ("TrackFrame", 4, b"\x22\0"),
+            // Obstacles, and tubes of one point.
+            ("TrackFrame", 4, b"\x2a\0"),
+            ("FindGraspRequest", 1, b"\x2a\x04\x0a\x02\x0a\0"),
+            // Regions, and ones of one shape; known grips; names of parts.
+            ("CreateObjectRequest", 1, b"\x3a\0"),
+            ("CreateObjectRequest", 1, b"\x3a\x02\x32\0"),
+            ("CreateObjectRequest", 1, b"\x42\0"),
+            ("CreateObjectRequest", 1, b"\x5a\0"),
+        ];
+        fields
+            .iter()
+            .flat_map(|&(name, outer, field)| repeated(name, outer, field))
+            .collect()
+    },
     longest: LONGEST,
     dense_bytes_per_byte: 4,
     words: Vec::new,
