@@ -147,7 +147,8 @@ pub(crate) fn measure_crowds(setting: &Setting) -> Vec<Line> {
 async fn crowd(tracks: usize, seconds: u64) -> Line {
     let server = TestServer::start_with(|config| {
         config.builder_threads = 1;
-        config.streams.tracks = tracks.try_into().expect("there are tracks");
+        // They are of one client, which leaves some to others.
+        config.streams.tracks = (2 * tracks).try_into().expect("there are tracks");
     })
     .await;
     let frames = (seconds as f64 * RATE) as u64;
