@@ -13,7 +13,7 @@ mod upload;
 
 use std::{
     borrow::Cow,
-    sync::{Arc, Mutex, OnceLock},
+    sync::{Arc, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
@@ -36,9 +36,9 @@ use crate::{
     client::Client,
     error::add_request_id,
     executor::{Admission, QueueTime},
-    limits::locked,
     metrics::{Method, Metrics},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+    sync::{Mutex, locked},
     traces::{CallTrace, Interval, Traces},
 };
 
@@ -111,7 +111,7 @@ impl CallContext {
         }
     }
 
-    fn arriving(headers: &HeaderMap, client: Client, metrics: &Arc<Metrics>) -> Self {
+    pub(crate) fn arriving(headers: &HeaderMap, client: Client, metrics: &Arc<Metrics>) -> Self {
         let arrived = Instant::now();
         let timeout = headers.get("grpc-timeout");
         let timeout = timeout.and_then(|timeout| parse_grpc_timeout(timeout.to_str().ok()?));

@@ -1,7 +1,7 @@
 //! Data derived from objects for searches: built when first needed, and dropped first when memory is short.
 
 use std::{
-    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+    sync::{Arc, OnceLock},
     thread,
     time::Instant,
 };
@@ -27,6 +27,7 @@ use crate::{
     error::ServiceError,
     executor::{before, run_stoppable},
     rigs::store::RigStore,
+    sync::{Mutex, locked},
     validate::RequestedSize,
 };
 
@@ -60,8 +61,7 @@ impl Derived {
     /// each hand would have to do. Takes some ten milliseconds per hand the first time, in parallel if the system has a thread for
     /// it.
     pub(crate) fn prepare(&self, rig: &str, stop: Stop<'_>) -> Result<(), Stopped> {
-        // Nothing is left inconsistent if preparing panics.
-        let _preparing = self.preparing.lock().unwrap_or_else(PoisonError::into_inner);
+        let _preparing = locked(&self.preparing);
         if self.is_prepared(rig) {
             return Ok(());
         }
@@ -130,7 +130,7 @@ pub(super) struct DerivedCell {
 impl DerivedCell {
     /// The data, if kept.
     pub(super) fn get(&self) -> Option<Arc<Derived>> {
-        self.lock().clone()
+        locked(&self.kept).clone()
     }
 
     /// The data. Calls `build` unless it is kept, or another call builds it meanwhile.
@@ -138,30 +138,24 @@ impl DerivedCell {
         &self,
         build: impl FnOnce() -> Result<Arc<Derived>, Stopped>,
     ) -> Result<Arc<Derived>, Stopped> {
-        // Nothing is left inconsistent if `build` panics.
-        let _building = self.building.lock().unwrap_or_else(PoisonError::into_inner);
+        let _building = locked(&self.building);
         if let Some(kept) = self.get() {
             return Ok(kept);
         }
         let built = build()?;
-        *self.lock() = Some(Arc::clone(&built));
+        *locked(&self.kept) = Some(Arc::clone(&built));
         Ok(built)
     }
 
     /// Drops the data. Calls that use it are not disturbed.
     pub(super) fn forget(&self) {
-        *self.lock() = None;
+        *locked(&self.kept) = None;
     }
 
     /// True if a call uses the data.
     pub(super) fn is_in_use(&self) -> bool {
-        let kept = self.lock();
+        let kept = locked(&self.kept);
         kept.as_ref().is_some_and(|kept| Arc::strong_count(kept) > 1)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Option<Arc<Derived>>> {
-        // No code panics while it holds the lock.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -22,8 +22,8 @@ use crate::{
     limits::BYTES_BESIDES_MESH,
     saved::{
         FieldMove, RIGS, Records, SavedFiles, Unreadable, field, is_decodable, message, move_fields, seal,
-        wait_for,
     },
+    sync::wait_for,
 };
 
 /// All rigs.

@@ -17,7 +17,7 @@ mod watching;
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::Arc,
     time::{Duration, SystemTime},
 };
 
@@ -40,7 +40,8 @@ use crate::{
     access::{Caller, Owner},
     error::ServiceError,
     limits::StoreLimits,
-    saved::{NotCreated, wait_for},
+    saved::NotCreated,
+    sync::{Mutex, MutexGuard, locked, wait_for},
     validate::{Labels, PageQuery, RequestKey},
 };
 
@@ -384,14 +385,12 @@ impl ObjectStore {
     }
 
     fn created(&self) -> MutexGuard<'_, Created> {
-        // No code panics while it holds the lock; if some did, the map would still be consistent.
-        self.created.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.created)
     }
 
     /// Waits until no other call adds, changes or deletes an object, and keeps them waiting.
     fn changing(&self) -> MutexGuard<'_, MeshUses> {
-        // No code panics while it holds the lock; if some did, a mesh might be kept in vain.
-        self.mesh_uses.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.mesh_uses)
     }
 }
 

@@ -7,7 +7,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     ops::Bound,
-    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
+    sync::{Arc, Weak},
 };
 
 use grasp_synthesis::model::hand::Handedness;
@@ -17,6 +17,7 @@ use super::{Created, ObjectStore};
 use crate::{
     error::ServiceError,
     objects::{Listed, StoredObject},
+    sync::{Mutex, MutexGuard, locked},
     validate::{Labels, ObjectFilter, WatchQuery},
 };
 
@@ -101,8 +102,7 @@ impl Watcher {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // No code panics while it holds the lock; if some did, the state would still be consistent.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.state)
     }
 }
 
