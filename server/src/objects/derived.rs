@@ -143,8 +143,12 @@ impl DerivedCell {
             return Ok(kept);
         }
         let built = build()?;
-        *locked(&self.kept) = Some(Arc::clone(&built));
+        self.keep(Arc::clone(&built));
         Ok(built)
+    }
+
+    pub(super) fn keep(&self, derived: Arc<Derived>) {
+        *locked(&self.kept) = Some(derived);
     }
 
     /// Drops the data. Calls that use it are not disturbed.

@@ -286,9 +286,10 @@ impl ObjectStore {
 
     /// The derived data of an object, if it is kept.
     pub(crate) fn kept(&self, object: &Arc<StoredObject>, need: Need) -> Option<Arc<Derived>> {
+        // Locked, so that it is not dropped before it is seen to be in use.
+        let mut created = self.created();
         let kept = object.derived.get()?;
         if need == Need::Call {
-            let mut created = self.created();
             let now = created.tick();
             if let Some(item) = created.cache.find(object, &Product::Derived) {
                 item.last_used = now;
@@ -324,7 +325,7 @@ impl ObjectStore {
         let current = entry.and_then(|entry| entry.state.object());
         let is_created = current.is_some_and(|current| Arc::ptr_eq(current, object));
         if is_created && created.cache.find(object, &Product::Derived).is_none() {
-            let kept = self.keep_derived(&mut created, object, derived.bytes(), need);
+            let kept = self.keep_derived(&mut created, object, &derived, need);
             kept.inspect_err(|_| object.derived.forget())?;
         }
         Ok(derived)
@@ -334,9 +335,10 @@ impl ObjectStore {
         &self,
         created: &mut Created,
         object: &Arc<StoredObject>,
-        bytes: usize,
+        derived: &Arc<Derived>,
         need: Need,
     ) -> Result<(), ServiceError> {
+        let bytes = derived.bytes();
         let whole = object.bytes() + bytes;
         if whole > self.limits.bytes {
             let most = self.limits.bytes;
@@ -359,6 +361,8 @@ impl ObjectStore {
             }
         };
         created.cache.add(object, Product::Derived, bytes, last_used);
+        // A call that found no room for it may have dropped it.
+        object.derived.keep(Arc::clone(derived));
         created.cache.drop_oldest_ahead();
         Ok(())
     }
