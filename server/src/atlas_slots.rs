@@ -1,14 +1,11 @@
 //! Atlas slots: one object's atlases, one slot per hand, and the demand for each.
 
-use std::{
-    sync::{Arc, Mutex, MutexGuard},
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use grasp_assets::hands::Hand;
 use grasp_synthesis::known::{atlas::Atlas, growth::Grown};
 
-use crate::limits::locked;
+use crate::sync::{Mutex, locked};
 
 /// Time after which a call counts half.
 const HALF_LIFE: Duration = Duration::from_mins(5);
@@ -104,7 +101,7 @@ pub(crate) struct AtlasSlots(Mutex<Vec<(Arc<Hand>, Slot)>>);
 impl AtlasSlots {
     /// A copy of a hand's slot. `None` if the hand was never requested.
     pub(crate) fn get(&self, hand: &Arc<Hand>) -> Option<Slot> {
-        let slots = self.lock();
+        let slots = locked(&self.0);
         let slot = slots.iter().find(|(other, _)| other == hand);
         slot.map(|(_, slot)| slot.clone())
     }
@@ -116,26 +113,29 @@ impl AtlasSlots {
 
     /// Records a call at a time since the server's start. True if the atlas must be put in the build queue.
     pub(crate) fn request(&self, hand: &Arc<Hand>, at: Duration) -> bool {
-        let mut slots = self.lock();
-        if slots.len() >= MAX_HANDS && slots.iter().all(|(other, _)| other != hand) {
-            let demand = |place: &usize| slots[*place].1.demand;
-            let least = (0..slots.len()).min_by(|a, b| demand(a).cmp(demand(b)));
-            let _ = least.map(|place| slots.swap_remove(place));
-        }
-        drop(slots);
-        self.with(hand, |slot| {
-            slot.demand = slot.demand.with_call(at);
-            let is_needed = matches!(slot.state, BuildState::Absent | BuildState::NoRoom);
-            if is_needed {
-                slot.state = BuildState::Growing;
+        let mut slots = locked(&self.0);
+        let place = slots.iter().position(|(other, _)| other == hand);
+        let place = place.unwrap_or_else(|| {
+            if slots.len() >= MAX_HANDS {
+                let demand = |place: &usize| slots[*place].1.demand;
+                let least = (0..slots.len()).min_by(|a, b| demand(a).cmp(demand(b)));
+                let _ = least.map(|place| slots.swap_remove(place));
             }
-            is_needed
-        })
+            slots.push((Arc::clone(hand), Slot::default()));
+            slots.len() - 1
+        });
+        let slot = &mut slots[place].1;
+        slot.demand = slot.demand.with_call(at);
+        let is_needed = matches!(slot.state, BuildState::Absent | BuildState::NoRoom);
+        if is_needed {
+            slot.state = BuildState::Growing;
+        }
+        is_needed
     }
 
     /// Replaces the grips of a hand, and the time that they took.
     pub(crate) fn set_grips(&self, hand: &Arc<Hand>, changed: Slot) {
-        self.with(hand, |slot| {
+        self.change(hand, |slot| {
             slot.grown = changed.grown;
             slot.learned = changed.learned;
             slot.build_time = changed.build_time;
@@ -143,31 +143,29 @@ impl AtlasSlots {
     }
 
     pub(crate) fn all(&self) -> Vec<(Arc<Hand>, Slot)> {
-        self.lock().clone()
+        locked(&self.0).clone()
     }
 
-    /// Fills a hand's slot with that of another object of the same grips. Growth of that object's atlas ends with the object, so
+    /// Fills the slots with those of another object of the same grips. Growth of that object's atlases ends with the object, so
     /// an incomplete atlas is absent here until it is requested.
-    pub(crate) fn take_over(&self, hand: &Arc<Hand>, slot: Slot) {
-        self.with(hand, |own| {
-            *own = Slot {
-                state: match slot.state {
-                    BuildState::Growing => BuildState::Absent,
-                    state => state,
-                },
-                ..slot
-            };
-        });
+    pub(crate) fn take_over(&self, of: &Self) {
+        let mut slots = of.all();
+        for (_, slot) in &mut slots {
+            if slot.state == BuildState::Growing {
+                slot.state = BuildState::Absent;
+            }
+        }
+        *locked(&self.0) = slots;
     }
 
     /// Ends the growth of an atlas.
     pub(crate) fn end(&self, hand: &Arc<Hand>, state: BuildState) {
-        self.with(hand, |slot| slot.state = state);
+        self.change(hand, |slot| slot.state = state);
     }
 
     /// Drops the atlas and the learned grips. An atlas in the build queue stays there.
     pub(crate) fn evict(&self, hand: &Arc<Hand>) {
-        self.with(hand, |slot| {
+        self.change(hand, |slot| {
             *slot = Slot {
                 state: match slot.state {
                     BuildState::Growing => BuildState::Growing,
@@ -180,18 +178,12 @@ impl AtlasSlots {
         });
     }
 
-    fn with<T>(&self, hand: &Arc<Hand>, change: impl FnOnce(&mut Slot) -> T) -> T {
-        let mut slots = self.lock();
-        let place = slots.iter().position(|(other, _)| other == hand);
-        let place = place.unwrap_or_else(|| {
-            slots.push((Arc::clone(hand), Slot::default()));
-            slots.len() - 1
-        });
-        change(&mut slots[place].1)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Vec<(Arc<Hand>, Slot)>> {
-        locked(&self.0)
+    /// Changes a hand's slot, unless other hands have taken its place.
+    fn change(&self, hand: &Arc<Hand>, change: impl FnOnce(&mut Slot)) {
+        let mut slots = locked(&self.0);
+        if let Some((_, slot)) = slots.iter_mut().find(|(other, _)| other == hand) {
+            change(slot);
+        }
     }
 }
 
@@ -221,6 +213,9 @@ mod tests {
         assert!(slots.request(&hands[MAX_HANDS], Duration::from_secs(101)));
         let is_there = |place: usize| slots.get(&hands[place]).is_some();
         assert!(is_there(0) && !is_there(1) && is_there(2) && is_there(MAX_HANDS));
+        // The end of its growth does not bring it back.
+        slots.end(&hands[1], BuildState::Finished);
+        assert!(!is_there(1) && slots.all().len() == MAX_HANDS);
         // The identity of a hand is its content.
         let twin = Arc::new(Hand::clone(&hands[2]));
         assert!(slots.get(&twin).is_some());

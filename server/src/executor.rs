@@ -26,6 +26,7 @@ use crate::{
     faults::{FaultPoint, Faults},
     limits::{Place, Places},
     metrics::Histogram,
+    sync::spawn_blocking,
 };
 
 /// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond
@@ -255,7 +256,7 @@ pub(crate) async fn run_blocking<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, ServiceError> {
     // The task catches the panic; the panic hook has logged it.
-    tokio::task::spawn_blocking(work).await.map_err(|error| {
+    spawn_blocking(work).await.map_err(|error| {
         if error.is_panic() {
             ServiceError::Panicked
         } else {

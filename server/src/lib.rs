@@ -20,6 +20,7 @@
 //!
 //! `metrics` counts calls and searches, by the `methods` of the services, `traces` are their spans, and `monitor` answers operators
 //! and probes on a port of its own. `warning_rate` bounds warnings that clients can cause, and `log_lines` escapes what they send.
+//! `sync` has locks, tasks and waits that tests can run in many orders.
 //!
 //! Before serving, `memory` and `open_files` compare the configured limits with those of the process, and `objects::directory` loads
 //! the folder of objects. Between calls, `atlases` builds atlases in the background.
@@ -30,7 +31,7 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  client  convention  error  faults  methods  middleware  reload  warning_rate  wire
+//! budget  client  convention  error  faults  methods  middleware  reload  sync  warning_rate  wire
 //! limits  listen  log_lines  metrics  tls  traces  viewer
 //! access  atlas_slots  health_check  net  saved  web
 //! executor  rigs
@@ -80,6 +81,7 @@ mod saved;
 mod search;
 mod serve;
 mod services;
+mod sync;
 mod tls;
 mod traces;
 mod track;

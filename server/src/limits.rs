@@ -1,9 +1,9 @@
-//! Bounds and locks that more than one module needs.
+//! Bounds that more than one module needs.
 
 use std::{
     collections::HashMap,
     num::NonZeroUsize,
-    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
+    sync::{Arc, Weak},
     time::Duration,
 };
 
@@ -12,6 +12,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use crate::{
     client::Client,
     error::{Limit, ServiceError},
+    sync::{Mutex, locked},
 };
 
 /// Bound on the objects that clients create.
@@ -134,11 +135,6 @@ impl ClientPermits {
         // Nothing closes the semaphore.
         permits.acquire_owned().await.ok()
     }
-}
-
-/// The content of a mutex, even of a poisoned one: no code leaves half a change when it panics.
-pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

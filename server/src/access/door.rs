@@ -4,7 +4,7 @@ use std::{
     collections::HashMap,
     num::NonZeroU32,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError, RwLock},
+    sync::{Arc, PoisonError, RwLock},
     time::{Duration, Instant},
 };
 
@@ -16,8 +16,8 @@ use super::{
 };
 use crate::{
     error::{Quota, ServiceError},
-    limits::locked,
     reload::Reloadable,
+    sync::{Mutex, locked},
 };
 
 /// Decides about calls.

@@ -19,7 +19,6 @@ use super::{files::AtlasFiles, growing::work};
 use crate::{
     atlas_slots::Demand,
     executor::{SearchExecutor, lower_priority},
-    limits::locked,
     objects::{
         StoredObject,
         store::{Need, ObjectStore},
@@ -195,7 +194,7 @@ impl BuildQueue {
     }
 
     fn jobs(&self) -> MutexGuard<'_, VecDeque<BuildJob>> {
-        locked(&self.jobs)
+        self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

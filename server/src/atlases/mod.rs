@@ -89,22 +89,12 @@ impl Atlases {
         Ok(atlases)
     }
 
-    /// Requests the atlases of a new object and the default rig's hands.
+    /// Requests the atlases of a new or changed object and the default rig's hands.
     pub(crate) fn register(&self, object: &Arc<StoredObject>) {
         if self.0.are_running() {
             let hands = [Handedness::Right, Handedness::Left].map(|side| self.0.default_hand(side));
             self.0.request(object, hands);
         }
-    }
-
-    /// Like [`Self::register`] for a changed object, which keeps its atlases if grips do not depend on the change.
-    pub(crate) fn register_changed(&self, before: &StoredObject, object: &Arc<StoredObject>) {
-        if self.0.are_running() && object.has_grips_of(before) {
-            for (hand, slot) in before.atlas_slots.all() {
-                self.0.objects.hand_over_atlas(object, &hand, slot);
-            }
-        }
-        self.register(object);
     }
 
     /// The known grips of an object and one or two hands; requests the atlases that are absent.
@@ -126,8 +116,7 @@ impl Atlases {
 
     /// Learns a grip that a search found under the object's own friction, up to `most` per object and hand, for later requests.
     pub(crate) fn learn(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, grip: Entry, most: usize) {
-        // Without a slot, other hands have taken its place.
-        if self.0.are_running() && most > 0 && object.atlas_slots.get(hand).is_some() {
+        if self.0.are_running() && most > 0 {
             self.0.objects.change_atlas(object, hand, |slot| {
                 slot.learned = Arc::new(slot.learned.with(&hand.rig, grip, most));
             });

@@ -20,7 +20,7 @@ use grasp_synthesis::{
 };
 
 use super::*;
-use crate::{limits::StoreLimits, objects::store::Origin};
+use crate::{limits::StoreLimits, objects::store::Origin, validate::Labels};
 
 /// Longest wait for any event; reached only if something hangs.
 const HANGS_AFTER: Duration = Duration::from_mins(5);
@@ -229,27 +229,31 @@ fn rebuilds_an_evicted_atlas_on_request() {
 
 #[test]
 fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
-    let [before, same] = [(); 2].map(|()| Arc::new(small("a")));
-    let heavier = before.object.with_properties(9.0, Vec3::ZERO, None, &[]);
-    let heavier = Arc::new(StoredObject::plain("a", heavier.unwrap()));
-    let atlases = start(1, &store(10, 1 << 30));
-    let known_of = grown(&before);
+    let objects = store(10, 1 << 30);
+    let atlases = start(1, &objects);
     let builders = &atlases.0;
-    assert!(builders.publish(&before, adult(), Arc::clone(&known_of), Duration::ZERO));
+    let before = insert(&objects, small("a"));
+    let known_of = grown(&before);
+    for hand in [adult(), left()] {
+        before.atlas_slots.request(hand, Duration::ZERO);
+        assert!(builders.publish(&before, hand, Arc::clone(&known_of), Duration::ZERO));
+    }
     before.atlas_slots.end(adult(), BuildState::Finished);
-    assert!(builders.publish(&before, left(), Arc::clone(&known_of), Duration::ZERO));
-    before.atlas_slots.request(left(), Duration::ZERO);
     atlases.learn(&before, adult(), known_of.atlas.entries()[0].clone(), 5);
-    atlases.register_changed(&before, &same);
-    atlases.register_changed(&before, &heavier);
+    let change = |changed| {
+        let base = objects.changeable("a", None).unwrap();
+        let state = objects.replace(&base, Labels::new(), Some(changed)).unwrap();
+        let object = Arc::clone(state.object().unwrap());
+        atlases.register(&object);
+        object
+    };
+    let same = change(small("a"));
     let complete = slot_of(&same, adult());
     assert_eq!(complete.state, BuildState::Finished);
     assert!(Arc::ptr_eq(&complete.grown.unwrap(), &known_of));
     assert_eq!(complete.learned, slot_of(&before, adult()).learned);
     assert_eq!(complete.learned.entries().len(), 1);
-    assert!(slot_of(&heavier, adult()).learned.is_empty());
-    // The heavier object's atlases start from nothing, and the left hand's goes on from where it was.
-    assert_eq!(slot_of(&heavier, adult()).state, BuildState::Growing);
+    // The left hand's atlas goes on from where it was.
     assert_eq!(slot_of(&same, left()).state, BuildState::Growing);
     let has_grown = || {
         slot_of(&same, left())
@@ -257,10 +261,26 @@ fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
             .is_some_and(|of| of.atlas.entries().len() > 10)
     };
     until("the growth of what was not complete", has_grown);
-    // All count, and can be dropped.
-    builders.objects.shrink_to(0);
-    let dropped = slot_of(&same, adult());
-    assert!(dropped.grown.is_none() && dropped.learned.is_empty());
+    // A heavier object's atlases start from nothing.
+    let heavier = same.object.with_properties(9.0, Vec3::ZERO, None, &[]);
+    let heavier = change(StoredObject::plain("a", heavier.unwrap()));
+    assert!(slot_of(&heavier, adult()).learned.is_empty());
+    assert_eq!(slot_of(&heavier, adult()).state, BuildState::Growing);
+}
+
+#[test]
+fn atlases_that_an_object_took_over_count_and_can_be_dropped() {
+    let objects = store(10, 1 << 30);
+    let before = insert(&objects, small("a"));
+    let known_of = grown(&before);
+    before.atlas_slots.request(adult(), Duration::ZERO);
+    assert!(objects.change_atlas(&before, adult(), |slot| slot.grown = Some(known_of)));
+    let base = objects.changeable("a", None).unwrap();
+    let state = objects.replace(&base, Labels::new(), Some(small("a"))).unwrap();
+    let same = state.object().unwrap();
+    assert!(slot_of(same, adult()).grown.is_some());
+    objects.shrink_to(0);
+    assert!(slot_of(same, adult()).grown.is_none());
 }
 
 /// The atlas that a server reads from a file, and how many grips the file has afterwards.

@@ -26,10 +26,11 @@ use crate::{
     client::Client,
     error::{ServiceError, blame_client},
     executor::SearchExecutor,
-    limits::{ClientPermits, MAX_FIND_REQUEST, Places, locked},
+    limits::{ClientPermits, MAX_FIND_REQUEST, Places},
     metrics::Metrics,
     middleware::{Answer, Middleware, filtered},
     net::{Reader, arriving},
+    sync::locked,
     traces::Traces,
 };
 

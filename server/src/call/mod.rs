@@ -13,7 +13,7 @@ mod upload;
 
 use std::{
     borrow::Cow,
-    sync::{Arc, Mutex, OnceLock},
+    sync::{Arc, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
@@ -36,10 +36,10 @@ use crate::{
     client::Client,
     error::add_request_id,
     executor::{Admission, QueueTime},
-    limits::locked,
     metrics::{Method, Metrics},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
     net::Reader,
+    sync::{Mutex, locked},
     traces::{CallTrace, Interval, Traces},
 };
 
@@ -112,7 +112,7 @@ impl CallContext {
         }
     }
 
-    fn arriving(headers: &HeaderMap, client: Client, metrics: &Arc<Metrics>) -> Self {
+    pub(crate) fn arriving(headers: &HeaderMap, client: Client, metrics: &Arc<Metrics>) -> Self {
         let arrived = Instant::now();
         let timeout = headers.get("grpc-timeout");
         let timeout = timeout.and_then(|timeout| parse_grpc_timeout(timeout.to_str().ok()?));

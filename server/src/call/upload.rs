@@ -5,7 +5,7 @@
 
 use std::{
     pin::Pin,
-    sync::{Arc, Mutex, OnceLock},
+    sync::{Arc, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
@@ -17,8 +17,9 @@ use tonic::body::Body;
 use crate::{
     client::Client,
     error::ServiceError,
-    limits::{ClientPermits, Place, Places, locked},
+    limits::{ClientPermits, Place, Places},
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+    sync::{Mutex, locked},
 };
 
 /// Bytes of an upload that arrive without a place: the whole of most objects of a few hundred triangles.

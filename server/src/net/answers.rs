@@ -1,7 +1,7 @@
 //! Counts answers until they are read, and requests until they are answered: clients may begin more than they end.
 
 use std::{
-    sync::{Arc, Mutex, Weak},
+    sync::{Arc, Weak},
     task::{Context, Poll},
 };
 
@@ -12,8 +12,8 @@ use tonic::body::Body;
 
 use super::reader::{OpenRequest, Reader, WaitingBytes};
 use crate::{
-    limits::locked,
     middleware::{Answer, FrameFilter, Middleware, PolledFrame, filtered, next_frame},
+    sync::{Mutex, locked},
 };
 
 /// Largest chunk handed to the transport at once, in bytes: small enough to show the progress of a slow client.

@@ -4,7 +4,7 @@ use std::{
     collections::{BTreeMap, HashMap},
     ops::Deref,
     sync::{
-        Arc, Mutex,
+        Arc,
         atomic::{AtomicUsize, Ordering},
     },
     time::{Duration, Instant},
@@ -16,7 +16,12 @@ use super::{
     frames::{FrameBudget, PER_CONNECTION},
     reader::{CloseReason, Phase, Reader},
 };
-use crate::{client::Client, limits::locked, metrics::Counters, warning_rate::WarningRate};
+use crate::{
+    client::Client,
+    metrics::Counters,
+    sync::{Mutex, locked},
+    warning_rate::WarningRate,
+};
 
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
 const MAX_STALL: Duration = Duration::from_secs(20);

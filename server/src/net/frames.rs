@@ -2,12 +2,9 @@
 //! costs the server more than its sender. A client has a budget of them, over all its connections, that grows with time and with
 //! its answers; a connection that exceeds it is closed.
 
-use std::{
-    sync::Mutex,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
-use crate::limits::locked;
+use crate::sync::{Mutex, locked};
 
 /// Frames that a client may send at once; a thousand new connections send some thousands.
 const MAX_SAVED: u64 = 10_000;

@@ -8,7 +8,7 @@
 
 use std::{
     sync::{
-        Arc, Mutex,
+        Arc,
         atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering},
     },
     time::{Duration, Instant},
@@ -24,7 +24,8 @@ use super::{
 use crate::{
     client::Client,
     error::{Limit, ServiceError},
-    limits::{MAX_RESPONSE, locked},
+    limits::MAX_RESPONSE,
+    sync::{Mutex, locked},
     tls::PeerName,
 };
 

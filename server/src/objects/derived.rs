@@ -1,7 +1,7 @@
 //! Data derived from objects for searches: built when first needed, and dropped first when memory is short.
 
 use std::{
-    sync::{Arc, Mutex, MutexGuard, OnceLock},
+    sync::{Arc, OnceLock},
     thread,
     time::Instant,
 };
@@ -26,8 +26,8 @@ use super::{StoredObject, mesh_file::check_resized, store::SizeSlot};
 use crate::{
     error::ServiceError,
     executor::{before, run_stoppable},
-    limits::locked,
     rigs::store::RigStore,
+    sync::{Mutex, locked},
     validate::RequestedSize,
 };
 
@@ -61,7 +61,6 @@ impl Derived {
     /// each hand would have to do. Takes some ten milliseconds per hand the first time, in parallel if the system has a thread for
     /// it.
     pub(crate) fn prepare(&self, rig: &str, stop: Stop<'_>) -> Result<(), Stopped> {
-        // Nothing is left inconsistent if preparing panics.
         let _preparing = locked(&self.preparing);
         if self.is_prepared(rig) {
             return Ok(());
@@ -131,7 +130,7 @@ pub(super) struct DerivedCell {
 impl DerivedCell {
     /// The data, if kept.
     pub(super) fn get(&self) -> Option<Arc<Derived>> {
-        self.lock().clone()
+        locked(&self.kept).clone()
     }
 
     /// The data. Calls `build` unless it is kept, or another call builds it meanwhile.
@@ -139,29 +138,28 @@ impl DerivedCell {
         &self,
         build: impl FnOnce() -> Result<Arc<Derived>, Stopped>,
     ) -> Result<Arc<Derived>, Stopped> {
-        // Nothing is left inconsistent if `build` panics.
         let _building = locked(&self.building);
         if let Some(kept) = self.get() {
             return Ok(kept);
         }
         let built = build()?;
-        *self.lock() = Some(Arc::clone(&built));
-        Ok(built)
+        Ok(self.keep(built))
+    }
+
+    /// Keeps the data, unless there is some. The kept data.
+    pub(super) fn keep(&self, derived: Arc<Derived>) -> Arc<Derived> {
+        Arc::clone(locked(&self.kept).get_or_insert(derived))
     }
 
     /// Drops the data. Calls that use it are not disturbed.
     pub(super) fn forget(&self) {
-        *self.lock() = None;
+        *locked(&self.kept) = None;
     }
 
     /// True if a call uses the data.
     pub(super) fn is_in_use(&self) -> bool {
-        let kept = self.lock();
+        let kept = locked(&self.kept);
         kept.as_ref().is_some_and(|kept| Arc::strong_count(kept) > 1)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Option<Arc<Derived>>> {
-        locked(&self.kept)
     }
 }
 

@@ -1,10 +1,12 @@
 //! Objects for tests.
 
+use bytes::Bytes;
 use glam::Vec3;
+use grasp_import::MeshLimits;
 use grasp_synthesis::geometry::mesh::TriangleMesh;
 
-use super::*;
-use crate::validate::{RegionFields, RegionKind};
+use super::{build::build_object, *};
+use crate::validate::{RegionFields, RegionKind, Violations, object_fields};
 
 impl StoredObject {
     /// An object whose file has the triangles of its mesh.
@@ -27,6 +29,24 @@ pub(crate) fn tetrahedron(id: &str, edge: f32, forbidden: &[u32]) -> StoredObjec
     let mesh = TriangleMesh::new(positions, triangles).unwrap();
     let object = unstopped(|stop| PlainObject::new_until(mesh, 0.1, Vec3::ZERO, Some(0.3), forbidden, stop));
     StoredObject::plain(id, object.unwrap())
+}
+
+pub(super) const LIMITS: MeshLimits = MeshLimits {
+    bytes: 10_000,
+    vertices: 100,
+    triangles: 100,
+};
+
+/// A tetrahedron of an edge in centimetres and a mass in kilograms, as a client creates it, and its mesh file.
+pub(super) fn with_mesh_file(id: &str, edge: u8, mass: f32) -> (StoredObject, Bytes) {
+    let mesh =
+        format!("v 0 0 0\nv {edge} 0 0\nv 0 {edge} 0\nv 0 0 {edge}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+    let mut request = v1::CreateObjectRequest::new(id, mesh.into_bytes(), mass);
+    request.object_mut().meters_per_unit = Some(0.01);
+    let violations = Violations::default();
+    let fields = object_fields(request, LIMITS.bytes, &violations);
+    let object = build_object(&fields, LIMITS, violations, Stop::NEVER).unwrap();
+    (object, fields.mesh.into())
 }
 
 /// A region that is not to be touched.

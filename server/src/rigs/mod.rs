@@ -2,10 +2,7 @@
 
 pub(crate) mod store;
 
-use std::{
-    collections::VecDeque,
-    sync::{Arc, Mutex},
-};
+use std::{collections::VecDeque, sync::Arc};
 
 use grasp_assets::hands::Hand;
 use grasp_import::Binding;
@@ -14,7 +11,10 @@ use grasp_synthesis::{
     propose::prepared::PreparedRig,
 };
 
-use crate::{access::Owner, limits::locked};
+use crate::{
+    access::Owner,
+    sync::{Mutex, locked},
+};
 
 /// Prefix of every rig's name.
 pub(crate) const COLLECTION: &str = "rigs/";

@@ -5,7 +5,7 @@ use std::{
     collections::BTreeMap,
     ops::Bound,
     sync::{
-        Arc, Mutex, MutexGuard,
+        Arc,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -22,11 +22,11 @@ use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of};
 use crate::{
     access::{Caller, Owner},
     error::ServiceError,
-    limits::{BYTES_BESIDES_MESH, locked},
+    limits::BYTES_BESIDES_MESH,
     saved::{
         FieldMove, RIGS, Records, SavedFiles, Unreadable, field, is_decodable, message, move_fields, seal,
-        wait_for,
     },
+    sync::{Mutex, MutexGuard, locked, wait_for},
 };
 
 /// All rigs.

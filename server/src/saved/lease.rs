@@ -4,7 +4,7 @@
 
 use std::{
     str,
-    sync::{Arc, Mutex, Weak},
+    sync::{Arc, Weak},
     time::Duration,
 };
 
@@ -16,7 +16,10 @@ use tokio::{
 use uuid::Uuid;
 
 use super::{StoreError, in_use, this_process};
-use crate::{limits::locked, tls::random_id};
+use crate::{
+    sync::{Mutex, locked},
+    tls::random_id,
+};
 
 /// The file, beside the folders.
 const FILE: &str = "lease";

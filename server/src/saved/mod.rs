@@ -211,6 +211,19 @@ impl SavedFiles {
     }
 }
 
+#[cfg(shuttle)]
+impl SavedFiles {
+    /// Files that end with this, for tests of orders.
+    pub(crate) fn in_memory() -> Self {
+        Self {
+            files: Arc::new(object_store::memory::InMemory::new()),
+            folder: None,
+            lease: None,
+            place: "memory".to_owned(),
+        }
+    }
+}
+
 /// The error of a call; only the log has the details.
 impl From<Error> for ServiceError {
     fn from(error: Error) -> Self {
@@ -221,14 +234,6 @@ impl From<Error> for ServiceError {
 
 fn log_failure(error: &Error) {
     tracing::error!(%error, "the store failed");
-}
-
-/// Waits for a future, on a thread that may block.
-///
-/// # Panics
-/// Outside the context of an async runtime, or on a thread that runs its tasks.
-pub(crate) fn wait_for<T>(future: impl Future<Output = T>) -> T {
-    tokio::runtime::Handle::current().block_on(future)
 }
 
 /// The file that the server locks while it uses the folder.

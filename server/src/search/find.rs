@@ -2,7 +2,7 @@
 
 use std::{
     sync::{
-        Arc, Mutex,
+        Arc,
         atomic::{AtomicU32, Ordering},
     },
     time::Instant,
@@ -27,7 +27,7 @@ use crate::{
     answer::wire_grasp,
     error::ServiceError,
     executor::{Admission, SearchExecutor, run_blocking},
-    limits::locked,
+    sync::{Mutex, locked},
     validate::Sent,
 };
 

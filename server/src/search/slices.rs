@@ -4,10 +4,7 @@
 //! of other searches. Slices cover consecutive attempts: slicing does not change which attempt wins a reproducible
 //! search.
 
-use std::{
-    sync::{Arc, Mutex},
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use grasp_synthesis::{
     base::{clock::Clock, stop::Stop},
@@ -20,7 +17,10 @@ use grasp_synthesis::{
 };
 use rayon::ThreadPool;
 
-use crate::{executor::Workers, limits::locked};
+use crate::{
+    executor::Workers,
+    sync::{Mutex, locked},
+};
 
 /// Target duration of a slice: short compared to a budget, and long compared to the 50 µs that starting the workers costs.
 const SLICE: Duration = Duration::from_millis(10);

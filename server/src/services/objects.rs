@@ -128,7 +128,7 @@ impl Handler {
                 (Some(before), None) => changed(before, &query.change)?,
                 (None, _) => None,
             };
-            let (Some(before), Some(changed)) = (object, changed) else {
+            let Some(changed) = changed else {
                 return if *labels == base.record.labels {
                     Ok(base)
                 } else {
@@ -140,7 +140,7 @@ impl Handler {
             }
             let state = handler.objects.replace(&base, labels.clone(), Some(changed))?;
             if let Some(object) = state.object() {
-                handler.atlases.register_changed(&before, object);
+                handler.atlases.register(object);
                 handler.derive_ahead(object);
             }
             Ok(state)

@@ -1,11 +1,7 @@
 //! Answers of many messages: a task sends them into a short queue, from which the transport takes them as fast as the client reads.
 //! Messages made from existing data need no queue: each is made when the transport takes it.
 
-use std::{
-    iter,
-    sync::{Arc, Mutex},
-    time::Duration,
-};
+use std::{iter, sync::Arc, time::Duration};
 
 use futures_util::stream::{self, BoxStream};
 use tokio::sync::mpsc::{self, error::SendTimeoutError};
@@ -13,7 +9,12 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
 use super::Shared;
-use crate::{error::ServiceError, executor::contained, faults::FaultPoint, limits::locked};
+use crate::{
+    error::ServiceError,
+    executor::contained,
+    faults::FaultPoint,
+    sync::{Mutex, locked},
+};
 
 /// Messages that wait for the transport. More keep a quick client busier; each takes memory per stream.
 const QUEUED: usize = 2;

@@ -1,24 +1,17 @@
 //! Inboxes of tracks, and the names of those whose frames come in calls of their own.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex},
-    time::{Duration, Instant},
-};
+use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use grasp_proto::v1;
-use tokio::{
-    sync::{Notify, oneshot},
-    task::JoinSet,
-    time::timeout,
-};
+use tokio::sync::{Notify, oneshot};
 use uuid::Uuid;
 
 use crate::{
     access::{Caller, Owner},
     call::CallContext,
     error::{Limit, ServiceError},
-    limits::{Places, locked},
+    limits::Places,
+    sync::{JoinSet, Mutex, locked, timeout},
     tls::random_id,
     validate::{Latest, TrackIntake, quoted},
 };
@@ -124,7 +117,7 @@ impl Inbox {
         answered: u64,
         idle: Duration,
     ) -> Result<Option<PendingFrame>, ServiceError> {
-        let mut last_news = Instant::now();
+        let mut is_overdue = false;
         loop {
             let wait = {
                 let mut state = locked(&self.state);
@@ -133,7 +126,7 @@ impl Inbox {
                 }
                 let is_read = state.read.is_none_or(|read| answered < read + MAX_UNREAD)
                     || state.end.is_some()
-                    || last_news.elapsed() >= MAX_UNREAD_TIME;
+                    || is_overdue;
                 if is_read && let Some(latest) = state.latest.take() {
                     return Ok(Some(latest));
                 }
@@ -147,9 +140,8 @@ impl Inbox {
                 }
             };
             // A notice given before this wait ends it at once.
-            if timeout(wait, self.news.notified()).await.is_ok() {
-                last_news = Instant::now();
-            } else if locked(&self.state).latest.is_none() {
+            is_overdue = timeout(wait, self.news.notified()).await.is_err();
+            if is_overdue && locked(&self.state).latest.is_none() {
                 return Err(ServiceError::TrackIdle { limit: idle });
             }
         }

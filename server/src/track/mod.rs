@@ -7,6 +7,8 @@
 
 mod inbox;
 mod motion;
+#[cfg(all(test, shuttle))]
+mod orders;
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 

@@ -14,9 +14,7 @@ use std::{
 };
 
 use futures_util::{FutureExt as _, future::join_all};
-use grasp_import::MeshLimits;
 use grasp_proto::v1;
-use grasp_synthesis::base::stop::Stop;
 use proptest::prelude::*;
 use tokio::runtime::{EnterGuard, Runtime};
 
@@ -26,18 +24,13 @@ use crate::{
     limits::StoreLimits,
     objects::{
         Listed,
-        build::{build_object, changed},
+        build::changed,
         store::{ObjectStore as Objects, Origin},
-        tests::tetrahedron,
+        tests::{LIMITS, tetrahedron, with_mesh_file},
     },
-    saved::{StorePlace, wait_for},
-    validate::{Labels, ObjectChange, Violations, object_fields, page_query},
-};
-
-const LIMITS: MeshLimits = MeshLimits {
-    bytes: 10_000,
-    vertices: 100,
-    triangles: 100,
+    saved::StorePlace,
+    sync::wait_for,
+    validate::{Labels, ObjectChange, page_query},
 };
 
 /// Where the objects of all tests are saved and loaded.
@@ -111,17 +104,11 @@ fn labels(value: u8) -> Labels {
 
 /// A tetrahedron of so many centimetres, as a client creates it.
 fn create(objects: &Objects, id: &str, edge: u8) -> Result<Listed, ServiceError> {
-    let mesh =
-        format!("v 0 0 0\nv {edge} 0 0\nv 0 {edge} 0\nv 0 0 {edge}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
-    let mut with_mesh = v1::CreateObjectRequest::new(id, mesh.into_bytes(), 0.1);
-    with_mesh.object_mut().meters_per_unit = Some(0.01);
-    let violations = Violations::default();
-    let fields = object_fields(with_mesh, LIMITS.bytes, &violations);
-    let object = build_object(&fields, LIMITS, violations, Stop::NEVER).unwrap();
+    let (object, mesh) = with_mesh_file(id, edge, 0.1);
     let origin = Origin {
         labels: labels(edge),
         request: None,
-        mesh: fields.mesh.into(),
+        mesh,
         caller: Caller::default(),
     };
     objects.insert(object, origin)

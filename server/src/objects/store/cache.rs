@@ -33,7 +33,7 @@ pub(crate) enum Need {
 }
 
 #[derive(Clone, Debug)]
-enum Product {
+pub(super) enum Product {
     Derived,
     Size(ObjectSize, SizeSlot),
     /// The atlas for a hand, and the learned grips.
@@ -54,21 +54,21 @@ impl Product {
 #[derive(Debug)]
 pub(super) struct Item {
     of: Weak<StoredObject>,
-    product: Product,
-    bytes: usize,
+    pub product: Product,
+    pub bytes: usize,
     /// When a call last requested it, by the clock of [`Created::uses`]; 0 if none did. Atlases have demands instead.
     last_used: u64,
 }
 
 impl Item {
-    fn is_of(&self, object: &StoredObject) -> bool {
+    pub(super) fn is_of(&self, object: &StoredObject) -> bool {
         std::ptr::eq(self.of.as_ptr(), object)
     }
 
     /// False if the object is gone, or other hands took the place of the atlas' hand.
     pub(super) fn is_there(&self) -> bool {
         self.of.upgrade().is_some_and(|object| match &self.product {
-            Product::Atlas(hand) => object.atlas_slots.demand(hand).is_some(),
+            Product::Atlas(hand) => object.atlas_slots.get(hand).is_some_and(|slot| slot.bytes() > 0),
             Product::Derived | Product::Size(..) => true,
         })
     }
@@ -109,7 +109,7 @@ impl Item {
 /// Data that can be made again, in the order in which it was added.
 #[derive(Debug, Default)]
 pub(super) struct Cache {
-    items: Vec<Item>,
+    pub items: Vec<Item>,
 }
 
 impl Cache {
@@ -131,9 +131,22 @@ impl Cache {
         self.items.retain(stays);
     }
 
-    /// Forgets the items of an object that is changed or gone.
+    /// Forgets the items of an object that is gone.
     pub(super) fn forget(&mut self, object: &StoredObject) {
         self.retain(|item| !item.is_of(object));
+    }
+
+    /// Gives a changed object the known grips of the object that it replaces, if they hold it.
+    pub(super) fn hand_over(&mut self, before: &StoredObject, after: &Arc<StoredObject>) {
+        if !after.has_grips_of(before) {
+            return;
+        }
+        after.atlas_slots.take_over(&before.atlas_slots);
+        for (hand, slot) in after.atlas_slots.all() {
+            if slot.bytes() > 0 {
+                self.add(after, Product::Atlas(hand), slot.bytes(), 0);
+            }
+        }
     }
 
     /// Drops the first item that may go and is not in use. False if there is none.
@@ -273,9 +286,10 @@ impl ObjectStore {
 
     /// The derived data of an object, if it is kept.
     pub(crate) fn kept(&self, object: &Arc<StoredObject>, need: Need) -> Option<Arc<Derived>> {
+        // Locked, so that it is not dropped before it is seen to be in use.
+        let mut created = self.created();
         let kept = object.derived.get()?;
         if need == Need::Call {
-            let mut created = self.created();
             let now = created.tick();
             if let Some(item) = created.cache.find(object, &Product::Derived) {
                 item.last_used = now;
@@ -311,7 +325,7 @@ impl ObjectStore {
         let current = entry.and_then(|entry| entry.state.object());
         let is_created = current.is_some_and(|current| Arc::ptr_eq(current, object));
         if is_created && created.cache.find(object, &Product::Derived).is_none() {
-            let kept = self.keep_derived(&mut created, object, derived.bytes(), need);
+            let kept = self.keep_derived(&mut created, object, &derived, need);
             kept.inspect_err(|_| object.derived.forget())?;
         }
         Ok(derived)
@@ -321,9 +335,10 @@ impl ObjectStore {
         &self,
         created: &mut Created,
         object: &Arc<StoredObject>,
-        bytes: usize,
+        derived: &Arc<Derived>,
         need: Need,
     ) -> Result<(), ServiceError> {
+        let bytes = derived.bytes();
         let whole = object.bytes() + bytes;
         if whole > self.limits.bytes {
             let most = self.limits.bytes;
@@ -346,6 +361,8 @@ impl ObjectStore {
             }
         };
         created.cache.add(object, Product::Derived, bytes, last_used);
+        // A call that found no room for it may have dropped it.
+        object.derived.keep(Arc::clone(derived));
         created.cache.drop_oldest_ahead();
         Ok(())
     }
@@ -396,7 +413,8 @@ impl ObjectStore {
         Ok(new)
     }
 
-    /// Changes the known grips of an object and a hand if there is room. Otherwise returns false, and changes and evicts nothing.
+    /// Changes the known grips of an object and a hand if there is room, and other hands have not taken its place. Otherwise returns
+    /// false, and changes and evicts nothing.
     pub(crate) fn change_atlas(
         &self,
         object: &Arc<StoredObject>,
@@ -404,7 +422,9 @@ impl ObjectStore {
         change: impl FnOnce(&mut Slot),
     ) -> bool {
         let mut created = self.created();
-        let mut slot = object.atlas_slots.get(hand).unwrap_or_default();
+        let Some(mut slot) = object.atlas_slots.get(hand) else {
+            return false;
+        };
         let (before, demand) = (slot.bytes(), slot.demand);
         change(&mut slot);
         let after = slot.bytes();
@@ -428,16 +448,6 @@ impl ObjectStore {
         let created = self.created();
         let slot = object.atlas_slots.get(hand).unwrap_or_default();
         self.has_room(&created, slot.demand, bytes.saturating_sub(slot.bytes()))
-    }
-
-    /// Gives a changed object the known grips of the object that it replaces.
-    pub(crate) fn hand_over_atlas(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, slot: Slot) {
-        let mut created = self.created();
-        if slot.bytes() > 0 {
-            let product = Product::Atlas(Arc::clone(hand));
-            created.cache.add(object, product, slot.bytes(), 0);
-        }
-        object.atlas_slots.take_over(hand, slot);
     }
 }
 

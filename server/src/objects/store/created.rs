@@ -156,11 +156,18 @@ impl Created {
             return;
         };
         let before = std::mem::replace(&mut entry.state, state.clone());
-        let is_same_object = before.object().map(Arc::as_ptr) == state.object().map(Arc::as_ptr);
         self.uncount(&before);
         self.count(state);
-        if let Some(object) = before.object().filter(|_| !is_same_object) {
-            self.cache.forget(object);
+        match (before.object(), state.object()) {
+            (Some(before), Some(after)) if Arc::ptr_eq(before, after) => {}
+            (Some(before), after) => {
+                self.cache.forget(before);
+                // Before any call sees it.
+                if let Some(after) = after {
+                    self.cache.hand_over(before, after);
+                }
+            }
+            (None, _) => {}
         }
     }
 

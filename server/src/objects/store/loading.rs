@@ -179,19 +179,28 @@ impl ObjectStore {
 
     async fn load_now(self: &Arc<Self>, resting: &Arc<v1::GraspObject>) -> Outcome {
         let id = id_of(&resting.name);
-        let object = self.read_and_build(id, None).await;
-        let mut created = self.created();
-        let state = created.objects.get(id).map(|entry| entry.state.clone());
-        let is_same = |state: &Listed| matches!(&state.body, Body::AtRest(now) if Arc::ptr_eq(now, resting));
-        // An error of a replaced state is not one of the present state.
-        let Some(mut state) = state.filter(is_same) else {
-            return Ok(None);
-        };
-        state.body = Body::Loaded(Arc::new(object?));
-        let reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
-        reserved.release(&mut created);
-        created.set_state(id, &state);
-        Ok(state.loaded().ok())
+        let read = self.read_and_build(id, None).await;
+        {
+            let mut created = self.created();
+            let state = created.objects.get(id).map(|entry| entry.state.clone());
+            let is_same =
+                |state: &Listed| matches!(&state.body, Body::AtRest(now) if Arc::ptr_eq(now, resting));
+            // An error of a replaced state is not one of the present state.
+            let Some(mut state) = state.filter(is_same) else {
+                return Ok(None);
+            };
+            let (object, etag) = read?;
+            if etag == state.record.etag || !self.is_changing() {
+                state.body = Body::Loaded(Arc::new(object));
+                let reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
+                reserved.release(&mut created);
+                created.set_state(id, &state);
+                return Ok(state.loaded().ok());
+            }
+        }
+        // It was read from a change that is being saved, and may yet fail.
+        self.undisturbed(|_, _| ()).await?;
+        Ok(None)
     }
 
     /// The object as it would be created with a change. `None` if its file is not saved.
@@ -203,18 +212,20 @@ impl ObjectStore {
         if self.saved.is_none() {
             return Ok(None);
         }
-        self.read_and_build(id, Some(change)).await.map(Some)
+        let (object, _) = self.read_and_build(id, Some(change)).await?;
+        Ok(Some(object))
     }
 
+    /// The object as it is saved, or with a change, and the etag of what is saved.
     async fn read_and_build(
         self: &Arc<Self>,
         id: &str,
         change: Option<&ObjectChange>,
-    ) -> Result<StoredObject, ServiceError> {
+    ) -> Result<(StoredObject, String), ServiceError> {
         loop {
             let etag = self.get(id)?.record.etag.clone();
-            if let Some(object) = self.try_read_and_build(id, change).await? {
-                return Ok(object);
+            if let Some(read) = self.try_read_and_build(id, change).await? {
+                return Ok(read);
             }
             let wrong = "its mesh is missing, or its SHA-256 is wrong";
             self.blame(id, etag, &wrong).await?;
@@ -226,7 +237,7 @@ impl ObjectStore {
         self: &Arc<Self>,
         id: &str,
         change: Option<&ObjectChange>,
-    ) -> Result<Option<StoredObject>, ServiceError> {
+    ) -> Result<Option<(StoredObject, String)>, ServiceError> {
         let saved = self.saved_objects()?;
         let acquired = Arc::clone(&saved.loads).acquire_owned().await;
         let permit = acquired.map_err(|_| ServiceError::ShuttingDown)?;
@@ -235,6 +246,7 @@ impl ObjectStore {
         let (mesh, room) = saved.mesh(&record).await?;
         let hash = record.mesh_hash();
         let mut given = record.given();
+        let etag = std::mem::take(&mut given.etag);
         if let Some(change) = change {
             change_given(&mut given, change);
         }
@@ -245,7 +257,8 @@ impl ObjectStore {
             let Some(mesh) = mesh else { return Ok(None) };
             let violations = Violations::default();
             let fields = saved_object_fields(given, mesh.into(), &violations);
-            build_object(&fields, limits, violations, stop).map(Some)
+            let object = build_object(&fields, limits, violations, stop)?;
+            Ok(Some((object, etag)))
         });
         match built.await? {
             // Its request was valid under the limits at its creation.

@@ -11,13 +11,15 @@ mod cache;
 mod created;
 mod figures;
 mod loading;
+#[cfg(all(test, shuttle))]
+mod orders;
 #[cfg(test)]
 mod tests;
 mod watching;
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, MutexGuard},
+    sync::{Arc, TryLockError},
     time::{Duration, SystemTime},
 };
 
@@ -39,8 +41,9 @@ use super::{
 use crate::{
     access::{Caller, Owner},
     error::ServiceError,
-    limits::{StoreLimits, locked},
-    saved::{CreateFailure, wait_for},
+    limits::StoreLimits,
+    saved::CreateFailure,
+    sync::{Mutex, MutexGuard, locked, wait_for},
     validate::{Labels, PageQuery, RequestKey},
 };
 
@@ -279,11 +282,13 @@ impl ObjectStore {
         let id = base.id();
         let _changing = self.changing();
         let changed = changed.map(Arc::new);
-        let reserved;
+        let (reserved, _held);
         let (before, record) = {
             let mut created = self.created();
             let etag = created.next_etag();
             let before = created.entry_with(id, Some(&base.record.etag))?.state.clone();
+            // It keeps its room until it is replaced.
+            _held = before.object().map(|object| object.hold());
             let record = Arc::new(Record {
                 labels,
                 owner: before.record.owner.clone(),
@@ -302,7 +307,7 @@ impl ObjectStore {
         let mut created = self.created();
         reserved.release(&mut created);
         saved?;
-        // It may have been loaded or put to rest meanwhile.
+        // It may have been loaded meanwhile.
         let after = with(&created.used_entry(id)?.state, changed.as_ref(), &record);
         created.set_state(id, &after);
         created.tell(id, Event::Updated, Some(&before.labels), Some(&record.labels));
@@ -386,6 +391,10 @@ impl ObjectStore {
 
     fn created(&self) -> MutexGuard<'_, Created> {
         locked(&self.created)
+    }
+
+    fn is_changing(&self) -> bool {
+        matches!(self.mesh_uses.try_lock(), Err(TryLockError::WouldBlock))
     }
 
     /// Waits until no other call adds, changes or deletes an object, and keeps them waiting.

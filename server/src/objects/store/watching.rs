@@ -7,7 +7,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     ops::Bound,
-    sync::{Arc, Mutex, MutexGuard, Weak},
+    sync::{Arc, Weak},
 };
 
 use grasp_synthesis::model::hand::Handedness;
@@ -16,8 +16,8 @@ use tokio::sync::Notify;
 use super::{Created, ObjectStore};
 use crate::{
     error::ServiceError,
-    limits::locked,
     objects::{Listed, StoredObject},
+    sync::{Mutex, MutexGuard, locked},
     validate::{Labels, ObjectFilter, WatchQuery},
 };
 
