@@ -3,13 +3,16 @@
 use std::{
     convert::Infallible,
     hash::{BuildHasher as _, RandomState},
-    pin::pin,
-    sync::Arc,
+    pin::{Pin, pin},
+    sync::{Arc, Mutex},
     task::{Context, Poll},
     time::Duration,
 };
 
+use bytes::Bytes;
 use http::{Request, Response, Version};
+use http_body::Body as _;
+use http_body_util::BodyExt as _;
 use hyper::{body::Incoming, service::service_fn};
 use hyper_util::{
     rt::{TokioExecutor, TokioIo, TokioTimer},
@@ -27,6 +30,7 @@ use super::{
     stream::WatchedStream,
 };
 use crate::{
+    limits::locked,
     listen::Stream,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
     tls::{Tls, TlsStream},
@@ -53,6 +57,10 @@ const CONNECTION_WINDOW: u32 = 1 << 20;
 
 /// Largest HTTP/2 frame, in bytes.
 const MAX_FRAME: u32 = 16 << 10;
+
+/// Largest body of a request that is read although the answer does not need it, in bytes, and the longest wait for it.
+const MAX_DRAINED: u64 = 64 << 10;
+const DRAIN_TIME: Duration = Duration::from_millis(500);
 
 /// Interval of pings on a silent connection.
 const KEEPALIVE_EVERY: Duration = Duration::from_secs(30);
@@ -123,12 +131,27 @@ impl<S: Service> ConnectionServer<S> {
         }
         let reader = Arc::clone(&place);
         let answering = service_fn(move |request: Request<Incoming>| {
-            let mut request = request.map(Body::new);
-            if request.version() < Version::HTTP_2 {
-                request = request.map(|body| filtered(body, ChunkCount(Arc::clone(&reader))));
-            }
+            let is_http_2 = request.version() == Version::HTTP_2;
+            let is_short = request
+                .body()
+                .size_hint()
+                .upper()
+                .is_some_and(|most| most <= MAX_DRAINED);
+            let rest = is_http_2.then(UnreadRest::default);
+            let mut request = request.map(|body| match &rest {
+                Some(rest) => rest.lend(Body::new(body)),
+                None => filtered(Body::new(body), ChunkCount(Arc::clone(&reader))),
+            });
             request.extensions_mut().insert(Arc::clone(&reader));
-            service.clone().oneshot(request)
+            let answer = service.clone().oneshot(request);
+            async move {
+                let answer = answer.await?;
+                let Some(rest) = rest else { return Ok(answer) };
+                if is_short {
+                    rest.drain().await;
+                }
+                Ok::<_, Infallible>(answer.map(|body| filtered(body, rest)))
+            }
         });
         let io = TokioIo::new(WatchedStream::new(stream, Arc::clone(&place)));
         let transport = transport();
@@ -192,6 +215,61 @@ async fn until_idle_for(reader: &Reader, time: Duration) {
             return;
         }
         tokio::time::sleep(left).await;
+    }
+}
+
+/// The part of a request's body that nobody reads any more, until the answer has been sent. HTTP/2 resets a stream whose body is
+/// dropped before, and its answer is lost.
+#[derive(Clone, Default)]
+struct UnreadRest(Arc<Mutex<Option<Body>>>);
+
+impl UnreadRest {
+    /// A body that comes back when it is dropped before its end.
+    fn lend(&self, body: Body) -> Body {
+        let rest = self.clone();
+        Body::new(LentBody { body, rest })
+    }
+
+    /// Reads it, for a client that does not expect its answer before it has sent its request (curl up to 7.88).
+    async fn drain(&self) {
+        let rest = locked(&self.0).take();
+        if let Some(mut rest) = rest {
+            let at_end = async { while let Some(Ok(_)) = rest.frame().await {} };
+            let _ = tokio::time::timeout(DRAIN_TIME, at_end).await;
+            *locked(&self.0) = Some(rest);
+        }
+    }
+}
+
+impl FrameFilter for UnreadRest {
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
+        next_frame(inner, cx)
+    }
+}
+
+struct LentBody {
+    body: Body,
+    rest: UnreadRest,
+}
+
+impl http_body::Body for LentBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> PolledFrame {
+        next_frame(&mut self.body, cx)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+}
+
+impl Drop for LentBody {
+    fn drop(&mut self) {
+        if !self.body.is_end_stream() {
+            *locked(&self.rest.0) = Some(std::mem::take(&mut self.body));
+        }
     }
 }
 

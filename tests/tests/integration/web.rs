@@ -153,6 +153,24 @@ async fn requests_of_other_protocols_are_refused_over_http_1_with_the_cause() {
     }
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn a_refusal_over_http_2_lets_the_client_send_the_rest_of_a_short_request() {
+    let server = TestServer::start().await;
+    let mut connection = Connection::open(&server, 1 << 20).await;
+    let headers = [
+        ("content-type", "application/x-www-form-urlencoded"),
+        ("content-length", "2"),
+    ];
+    let call = connection.call("grasp.v1.GraspService/FindGrasp", &headers).await;
+    let (answer, mut stream) = call.expect("the connection is open");
+    // Ample time to refuse what the headers show.
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    let sent = stream.send_data(Bytes::from_static(b"{}"), true);
+    sent.expect("the stream is not reset");
+    assert_eq!(answer_to(answer).await.status, 415);
+    connection.task.abort();
+}
+
 /// Sends headers of `bytes` bytes.
 async fn send_headers(address: SocketAddr, bytes: usize) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.unwrap();
