@@ -149,7 +149,10 @@ impl Calls {
     }
 
     fn delete(&self, id: &'static str) {
-        if self.outcome(self.store.remove(id, None, &Caller::default())).is_some() {
+        if self
+            .outcome(self.store.remove(id, None, &Caller::default()))
+            .is_some()
+        {
             self.acknowledge(id, None);
             assert!(!self.store.contains(id));
         }
