@@ -143,12 +143,12 @@ impl DerivedCell {
             return Ok(kept);
         }
         let built = build()?;
-        self.keep(Arc::clone(&built));
-        Ok(built)
+        Ok(self.keep(built))
     }
 
-    pub(super) fn keep(&self, derived: Arc<Derived>) {
-        *locked(&self.kept) = Some(derived);
+    /// Keeps the data, unless there is some. The kept data.
+    pub(super) fn keep(&self, derived: Arc<Derived>) -> Arc<Derived> {
+        Arc::clone(locked(&self.kept).get_or_insert(derived))
     }
 
     /// Drops the data. Calls that use it are not disturbed.
