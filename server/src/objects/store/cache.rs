@@ -286,14 +286,16 @@ impl ObjectStore {
 
     /// The derived data of an object, if it is kept.
     pub(crate) fn kept(&self, object: &Arc<StoredObject>, need: Need) -> Option<Arc<Derived>> {
-        // Locked, so that it is not dropped before it is seen to be in use.
+        // Locked first, so that the data is not dropped before it is seen to be in use.
         let mut created = self.created();
         let kept = object.derived.get()?;
-        if need == Need::Call {
-            let now = created.tick();
-            if let Some(item) = created.cache.find(object, &Product::Derived) {
-                item.last_used = now;
-            }
+        let now = created.tick();
+        let is_current = created.is_current(object);
+        match created.cache.find(object, &Product::Derived) {
+            Some(item) if need == Need::Call => item.last_used = now,
+            // Whoever built it has yet to find room for it.
+            None if is_current => return None,
+            _ => {}
         }
         Some(kept)
     }
@@ -321,11 +323,13 @@ impl ObjectStore {
             None => object.derived_until(stop)?,
         };
         let mut created = self.created();
-        let entry = created.objects.get(&object.id);
-        let current = entry.and_then(|entry| entry.state.object());
-        let is_created = current.is_some_and(|current| Arc::ptr_eq(current, object));
-        if is_created && created.cache.find(object, &Product::Derived).is_none() {
-            let kept = self.keep_derived(&mut created, object, &derived, need);
+        if !created.is_current(object) {
+            return Ok(derived);
+        }
+        // A call that found no room may have dropped it, and another one built it anew.
+        let derived = object.derived.keep(derived);
+        if created.cache.find(object, &Product::Derived).is_none() {
+            let kept = self.keep_derived(&mut created, object, derived.bytes(), need);
             kept.inspect_err(|_| object.derived.forget())?;
         }
         Ok(derived)
@@ -335,10 +339,9 @@ impl ObjectStore {
         &self,
         created: &mut Created,
         object: &Arc<StoredObject>,
-        derived: &Arc<Derived>,
+        bytes: usize,
         need: Need,
     ) -> Result<(), ServiceError> {
-        let bytes = derived.bytes();
         let whole = object.bytes() + bytes;
         if whole > self.limits.bytes {
             let most = self.limits.bytes;
@@ -361,8 +364,6 @@ impl ObjectStore {
             }
         };
         created.cache.add(object, Product::Derived, bytes, last_used);
-        // A call that found no room for it may have dropped it.
-        object.derived.keep(Arc::clone(derived));
         created.cache.drop_oldest_ahead();
         Ok(())
     }

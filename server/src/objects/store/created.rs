@@ -12,7 +12,7 @@ use super::{Event, cache::Cache, loading::Load, watching::Watcher};
 use crate::{
     access::{Caller, Owner},
     error::{Quota, ServiceError},
-    objects::{Body, Listed, name_of, saved::MeshHash},
+    objects::{Body, Listed, StoredObject, name_of, saved::MeshHash},
     validate::RequestKey,
 };
 
@@ -104,6 +104,13 @@ impl Created {
             return Err(exceeded(Quota::Bytes, most));
         }
         Ok(())
+    }
+
+    /// True if calls find this very object.
+    pub(super) fn is_current(&self, object: &Arc<StoredObject>) -> bool {
+        let entry = self.objects.get(&object.id);
+        let current = entry.and_then(|entry| entry.state.object());
+        current.is_some_and(|current| Arc::ptr_eq(current, object))
     }
 
     pub(super) fn tick(&mut self) -> u64 {

@@ -10,7 +10,7 @@ use grasp_synthesis::{
         growth::{Grown, Growth},
         primitives::Primitive,
     },
-    model::hand::Handedness,
+    model::{hand::Handedness, object::GraspObject},
     physical::grip::Gripper,
     propose::prepared::PreparedObject,
 };
@@ -25,7 +25,7 @@ use crate::{
     access::Caller,
     atlas_slots::Slot,
     objects::{
-        Revision,
+        Derived, Revision,
         derived::ObjectSize,
         tests::{LIMITS, with_mesh_file},
     },
@@ -54,6 +54,14 @@ static GROWN: LazyLock<Arc<Grown>> = LazyLock::new(|| {
         growth.round(&mut gripper);
     }
     Arc::new(growth.kept())
+});
+
+/// What is derived from an object of the tests, which takes longer than all else.
+static DERIVED: LazyLock<Derived> = LazyLock::new(|| {
+    let (object, _) = with_mesh_file("any", EDGE, MASS);
+    let object = GraspObject::of_until(object.object, Stop::NEVER).expect("nothing stops it");
+    let derived = Derived::of(Arc::new(object), Stop::NEVER).expect("nothing stops it");
+    Derived::clone(&derived)
 });
 
 fn adult() -> &'static Arc<Hand> {
@@ -174,7 +182,7 @@ impl Calls {
             return;
         };
         let _held = object.hold();
-        let derived = self.outcome(self.store.derived(&object, Need::Call, Stop::NEVER));
+        let derived = self.derive(&object, Need::Call);
         if derived.is_some() {
             self.store.check_counted(&object);
         }
@@ -195,9 +203,16 @@ impl Calls {
     /// Derives the data of an object before calls need it, and grows an atlas from it.
     fn prepare(&self, id: &str) {
         if let Some(Revision { object, .. }) = self.load(id) {
-            drop(self.outcome(self.store.derived(&object, Need::Ahead, Stop::NEVER)));
+            drop(self.derive(&object, Need::Ahead));
             self.grow(&object);
         }
+    }
+
+    fn derive(&self, object: &Arc<StoredObject>, need: Need) -> Option<Arc<Derived>> {
+        // Built here, so that the store seldom has to.
+        let built = object.derived.get_or_build(|| Ok(Arc::new(DERIVED.clone())));
+        drop(built);
+        self.outcome(self.store.derived(object, need, Stop::NEVER))
     }
 
     fn grow(&self, object: &Arc<StoredObject>) {
@@ -257,9 +272,7 @@ impl ObjectStore {
     /// Checks that derived data in use counts, unless its object was replaced or is gone.
     fn check_counted(&self, object: &Arc<StoredObject>) {
         let created = self.created();
-        let state = created.objects.get(&object.id).map(|entry| &entry.state);
-        let current = state.and_then(Listed::object);
-        if current.is_some_and(|current| Arc::ptr_eq(current, object)) {
+        if created.is_current(object) {
             let is_it = |item: &&Item| item.is_of(object) && matches!(item.product, Product::Derived);
             assert_eq!(created.cache.items.iter().filter(is_it).count(), 1);
         }
@@ -370,11 +383,13 @@ fn saved() -> SavedObjects {
 #[test]
 fn objects_in_memory_are_counted_and_not_lost_in_every_order() {
     LazyLock::force(&GROWN);
+    LazyLock::force(&DERIVED);
     in_many_orders(|| calls_at_the_same_time(None));
 }
 
 #[test]
 fn saved_objects_are_counted_and_not_lost_in_every_order() {
     LazyLock::force(&GROWN);
+    LazyLock::force(&DERIVED);
     in_many_orders(|| calls_at_the_same_time(Some(saved())));
 }
