@@ -4,7 +4,7 @@ use std::{
     convert::Infallible,
     hash::{BuildHasher as _, RandomState},
     pin::{Pin, pin},
-    sync::{Arc, Mutex},
+    sync::Arc,
     task::{Context, Poll},
     time::Duration,
 };
@@ -30,9 +30,9 @@ use super::{
     stream::WatchedStream,
 };
 use crate::{
-    limits::locked,
     listen::Stream,
     middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+    sync::{Mutex, locked},
     tls::{Tls, TlsStream},
 };
 
