@@ -83,6 +83,7 @@ pub(crate) fn open<'a>(
         .for_each(|extension| refused.push(refusal(extension)));
     refused.into_result()?;
     strip(&mut root);
+    check_positions(&root)?;
     stop.check()?;
     let has_draco = root.extensions_used.iter().any(|used| used == DRACO);
     let document = Document::from_json(root).map_err(|error| match error {
@@ -99,6 +100,26 @@ pub(crate) fn open<'a>(
         document,
         buffers,
     })
+}
+
+/// Checks that the positions of each mesh are there, which the crate takes for granted when it validates them.
+fn check_positions(root: &Root) -> Result<(), ImportError> {
+    let count = root.accessors.len();
+    for (number, mesh) in root.meshes.iter().enumerate() {
+        for primitive in &mesh.primitives {
+            let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            if let Some(positions) = positions.filter(|positions| positions.value() >= count) {
+                return Err(ImportError::at(
+                    format!("meshes[{number}]"),
+                    format!(
+                        "has positions in accessor {}; there are {count} accessors",
+                        positions.value()
+                    ),
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Bytes of a file, or decoded.

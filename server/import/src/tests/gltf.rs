@@ -300,3 +300,13 @@ fn every_triangle_may_have_vertices_of_its_own() {
     let found = crate::read_mesh(&scene.glb(), crate::Import::METRES, limits).unwrap();
     assert!((volume(&found) / Ring::volume() - 1.0).abs() < 1e-5);
 }
+
+#[test]
+fn positions_in_an_absent_accessor_are_refused_by_the_mesh() {
+    let json = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":5}}]}]}"#;
+    assert_mentioned(
+        &[message(json.as_bytes())],
+        &["meshes[0]", "accessor 5; there are 0 accessors"],
+    );
+}
