@@ -127,6 +127,12 @@ impl Cache {
         });
     }
 
+    fn take(&mut self, object: &StoredObject, product: &Product) -> Option<Item> {
+        let is_it = |item: &Item| item.is_of(object) && item.product.is_same(product);
+        let place = self.items.iter().position(is_it)?;
+        Some(self.items.remove(place))
+    }
+
     pub(super) fn retain(&mut self, stays: impl Fn(&Item) -> bool) {
         self.items.retain(stays);
     }
@@ -426,13 +432,12 @@ impl ObjectStore {
         let Some(mut slot) = object.atlas_slots.get(hand) else {
             return false;
         };
-        let (before, demand) = (slot.bytes(), slot.demand);
+        let demand = slot.demand;
         change(&mut slot);
         let after = slot.bytes();
         let product = Product::Atlas(Arc::clone(hand));
-        created
-            .cache
-            .retain(|item| !(item.is_of(object) && item.product.is_same(&product)));
+        // Not what it has: an object that is gone no longer counts.
+        let before = created.cache.take(object, &product).map_or(0, |item| item.bytes);
         let fits = self.make_room_ahead(&mut created, demand, after);
         if fits {
             object.atlas_slots.set_grips(hand, slot);
