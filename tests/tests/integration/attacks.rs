@@ -72,3 +72,18 @@ async fn a_client_that_floods_again_on_a_new_connection_has_no_new_budget() {
     assert!(first.is_closed && second.is_closed);
     assert!(second.rounds < first.rounds, "{first:?}, then {second:?}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_client_that_gives_up_its_calls_at_once_keeps_its_connection() {
+    let server = TestServer::start_on(BYSTANDER, |_| {}).await;
+    let calls = 64;
+    let given_up = flood(
+        Flood::RapidReset,
+        ATTACKER,
+        server.address(),
+        calls,
+        Duration::from_secs(1),
+    );
+    let fate = bounded("the calls", given_up).await;
+    assert!(!fate.is_closed && fate.rounds == calls, "{fate:?}");
+}

@@ -332,7 +332,7 @@ impl ObjectStore {
         if !created.is_current(object) {
             return Ok(derived);
         }
-        // A call that found no room may have dropped it, and another one built it anew.
+        // A call that found no room may have dropped it, and another one has built it since.
         let derived = object.derived.keep(derived);
         if created.cache.find(object, &Product::Derived).is_none() {
             let kept = self.keep_derived(&mut created, object, derived.bytes(), need);
