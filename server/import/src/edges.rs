@@ -12,6 +12,7 @@ pub(crate) struct EdgeUse(u32);
 const FORWARD: u32 = 1;
 const FIRST: u32 = 2;
 const BITS: u32 = 2;
+const SIDE: u32 = FORWARD | FIRST;
 
 impl EdgeUse {
     /// The triangle.
@@ -30,27 +31,42 @@ impl EdgeUse {
     }
 }
 
-/// The edges of those triangles that are not dropped, in the order of their ends.
-fn edge_uses(triangles: &[[u32; 3]], is_dropped: &[bool]) -> Vec<EdgeUse> {
-    let kept = is_dropped.iter().filter(|is_dropped| !**is_dropped).count();
-    // The ends of the edge, the lower index first, and the use.
-    let mut uses: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * kept);
-    for (triangle, &[a, b, c]) in triangles.iter().enumerate() {
-        if !is_dropped[triangle] {
-            uses.extend([(a, b), (b, c), (c, a)].map(|(from, to)| {
-                let forward = if from < to { FORWARD } else { 0 };
-                ([from.min(to), from.max(to)], (triangle as u32) << BITS | forward)
-            }));
+/// The edges of those triangles that are not dropped, in the order of their ends: sorted by their lower vertices as they are counted,
+/// which takes a quarter of the memory of a list with their ends.
+fn edge_uses(triangles: &[[u32; 3]], vertices: usize, is_dropped: &[bool]) -> Vec<EdgeUse> {
+    let ends = |triangle: usize, side: usize| {
+        let [from, to] = [side, (side + 1) % 3].map(|corner| triangles[triangle][corner]);
+        (from.min(to), from.max(to), from < to)
+    };
+    let kept = || (0..triangles.len()).filter(|&triangle| !is_dropped[triangle]);
+    let sides = || kept().flat_map(|triangle| (0..3).map(move |side| (triangle, side)));
+    let mut next = vec![0; vertices + 1];
+    for (triangle, side) in sides() {
+        next[ends(triangle, side).0 as usize + 1] += 1;
+    }
+    for vertex in 1..=vertices {
+        next[vertex] += next[vertex - 1];
+    }
+    // First with the side in place of the bits.
+    let mut uses = vec![EdgeUse(0); next[vertices]];
+    for (triangle, side) in sides() {
+        let place = &mut next[ends(triangle, side).0 as usize];
+        uses[*place] = EdgeUse(((triangle as u32) << BITS) | side as u32);
+        *place += 1;
+    }
+    let ends = |edge: EdgeUse| ends(edge.triangle(), (edge.0 & SIDE) as usize);
+    for of_vertex in uses.chunk_by_mut(|&a, &b| ends(a).0 == ends(b).0) {
+        of_vertex.sort_unstable_by_key(|&edge| (ends(edge).1, edge.0));
+        let mut before = None;
+        for edge in of_vertex {
+            let (_, upper, is_forward) = ends(*edge);
+            let forward = if is_forward { FORWARD } else { 0 };
+            let is_known = before.replace(upper) == Some(upper);
+            let first = if is_known { 0 } else { FIRST };
+            edge.0 = (edge.0 & !SIDE) | forward | first;
         }
     }
-    uses.sort_unstable();
-    let mut before = None;
-    let mut of_edges = Vec::with_capacity(uses.len());
-    of_edges.extend(uses.iter().map(|&(ends, user)| {
-        let is_first = before.replace(ends) != Some(ends);
-        EdgeUse(if is_first { user | FIRST } else { user })
-    }));
-    of_edges
+    uses
 }
 
 /// Drops the uses by some triangles.
@@ -142,6 +158,7 @@ impl Doubles {
     /// nothing else. Which of the two it is does not matter: the winding is repaired later.
     pub(crate) fn of(
         triangles: &[[u32; 3]],
+        vertices: usize,
         is_dropped: Vec<bool>,
         oddities: &mut Oddities,
         stop: Stop<'_>,
@@ -152,7 +169,7 @@ impl Doubles {
         };
         let pairs = doubles.drop_repeated(triangles, oddities);
         stop.check()?;
-        doubles.uses = edge_uses(triangles, &doubles.is_dropped);
+        doubles.uses = edge_uses(triangles, vertices, &doubles.is_dropped);
         if !pairs.is_empty() {
             doubles.drop_sides(&pairs, oddities);
         }

@@ -264,7 +264,7 @@ impl Scanner {
             return Err(raw.empty().into());
         }
         raw.unused_vertices = self.is_used.iter().filter(|is_used| !**is_used).count();
-        (raw.positions, raw.corners) = parse(&self.vertices, &self.faces, stop)?;
+        (raw.positions, raw.corners) = parse(self.vertices, self.faces, stop)?;
         let mut warn = |Occurrences { count, first }, what: &str| {
             let warning = format!("{count} vertices {what}; the first is on line {first}");
             raw.warnings.extend((count > 0).then_some(warning));
@@ -282,7 +282,13 @@ impl Scanner {
 }
 
 /// Parses plain vertices and faces into the positions that faces use, and the corners of all faces.
-fn parse(vertices: &str, faces: &str, stop: Stop<'_>) -> Result<(Vec<DVec3>, Vec<u32>), ImportError> {
+fn parse(
+    mut vertices: String,
+    mut faces: String,
+    stop: Stop<'_>,
+) -> Result<(Vec<DVec3>, Vec<u32>), ImportError> {
+    vertices.shrink_to_fit();
+    faces.shrink_to_fit();
     let text = vertices.as_bytes().chain(faces.as_bytes());
     // The scan drops references to material libraries; if one got through, it would be rejected, not opened.
     let reject = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
@@ -293,6 +299,7 @@ fn parse(vertices: &str, faces: &str, stop: Stop<'_>) -> Result<(Vec<DVec3>, Vec
             tobj::LoadError::ReadError => ImportError::Stopped,
             error => ImportError::Whole(format!("the text cannot be read: {error}")),
         })?;
+    drop((vertices, faces));
     let sum = |of: fn(&tobj::Mesh) -> usize| models.iter().map(|model| of(&model.mesh)).sum();
     let mut positions = Vec::with_capacity(sum(|mesh| mesh.positions.len() / 3));
     let mut corners = Vec::with_capacity(sum(|mesh| mesh.indices.len()));

@@ -1,9 +1,6 @@
 //! Splits the polygons of a mesh from a file, welds it, checks it and makes the repairs that are certain.
 
-use std::{
-    collections::HashMap,
-    hash::{BuildHasher, BuildHasherDefault, DefaultHasher},
-};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::{
@@ -16,15 +13,12 @@ use crate::{
     edges::{Doubles, components, note_odd},
     error::{ImportError, Violations},
     polygon::{MAX_CLIPPED_CORNERS, Split, split},
-    raw::{ODDITIES, Occurrences, Oddity, Places, RawMesh},
+    raw::{ODDITIES, Occurrences, Oddity, Places, RawFace, RawMesh},
     winding::face_outward,
 };
 
 /// Faces split between two checks whether to stop.
 const FACES_PER_CHECK: usize = 256;
-
-/// Vertices welded between two checks whether to stop.
-const VERTICES_PER_CHECK: usize = 4096;
 
 /// Splits polygons, welds, drops degenerate and repeated triangles, turns those that face the wrong way, and notes how they join.
 pub(crate) fn repair(
@@ -34,8 +28,7 @@ pub(crate) fn repair(
     stop: Stop<'_>,
 ) -> Result<ImportedMesh, Violations> {
     let mut corners = split_faces(&mut raw, stop)?;
-    let (positions, welded) = weld(&raw.positions, import, stop)?;
-    raw.positions = Vec::new();
+    let (positions, welded) = weld(std::mem::take(&mut raw.positions), import, stop)?;
     for corner in &mut corners {
         *corner = welded[*corner as usize];
     }
@@ -50,7 +43,7 @@ pub(crate) fn repair(
     let is_dropped: Vec<bool> = are_degenerate.collect();
     let oddities = &mut raw.oddities;
     chosen(0.., &is_dropped).for_each(|triangle| oddities.note(Oddity::NoArea, triangle));
-    let mut doubles = Doubles::of(triangles, is_dropped, oddities, stop)?;
+    let mut doubles = Doubles::of(triangles, positions.len(), is_dropped, oddities, stop)?;
     face_outward(&positions, triangles, &mut doubles.uses, oddities, stop)?;
     stop.check()?;
     let is_single: Vec<bool> = doubles.is_dropped.iter().map(|is_dropped| !is_dropped).collect();
@@ -129,6 +122,7 @@ fn warnings(raw: &RawMesh, singles: usize, parts: usize) -> Vec<String> {
 
 /// Splits every face of n corners into n - 2 triangles; takes the corners of a mesh that has triangles only.
 fn split_faces(raw: &mut RawMesh, stop: Stop<'_>) -> Result<Vec<u32>, Violations> {
+    raw.corners.shrink_to_fit();
     if raw.faces.are_triangles() {
         return Ok(std::mem::take(&mut raw.corners));
     }
@@ -164,24 +158,40 @@ fn split_faces(raw: &mut RawMesh, stop: Stop<'_>) -> Result<Vec<u32>, Violations
     Ok(triangles)
 }
 
-/// Positions in metres with +Y up, in single precision and each once, and the new index of each vertex.
-fn weld(positions: &[DVec3], import: Import, stop: Stop<'_>) -> Result<(Vec<Vec3>, Vec<u32>), Stopped> {
-    let mut known = HashMap::new();
-    let mut welded = Vec::new();
-    let mut indices = Vec::with_capacity(positions.len());
-    for (number, &position) in positions.iter().enumerate() {
-        stop.check_every(VERTICES_PER_CHECK, number)?;
-        // Adding zero turns −0 into 0, so that equal numbers have equal bits.
-        let position = import.metres_from_file(position).as_vec3() + Vec3::ZERO;
-        let index = known
-            .entry(position.to_array().map(f32::to_bits))
-            .or_insert_with(|| {
-                welded.push(position);
-                welded.len() as u32 - 1
-            });
-        indices.push(*index);
+/// Positions in metres with +Y up, in single precision and each once, and the new index of each vertex. Sorted, because a hash map
+/// would take three times the memory.
+fn weld(positions: Vec<DVec3>, import: Import, stop: Stop<'_>) -> Result<(Vec<Vec3>, Vec<u32>), Stopped> {
+    // Adding zero turns −0 into 0, so that equal numbers have equal bits.
+    let in_metres = |&position| import.metres_from_file(position).as_vec3() + Vec3::ZERO;
+    let mut all: Vec<Vec3> = positions.iter().map(in_metres).collect();
+    drop(positions);
+    stop.check()?;
+    let bits = |vertex: u32| all[vertex as usize].to_array().map(f32::to_bits);
+    let mut sorted: Vec<u32> = (0..all.len() as u32).collect();
+    sorted.sort_unstable_by_key(|&vertex| (bits(vertex), vertex));
+    stop.check()?;
+    // First the vertex that each one equals.
+    let mut indices = vec![0; all.len()];
+    for equal in sorted.chunk_by(|&a, &b| bits(a) == bits(b)) {
+        for &vertex in equal {
+            indices[vertex as usize] = equal[0];
+        }
     }
-    Ok((welded, indices))
+    drop(sorted);
+    let mut count = 0;
+    for vertex in 0..all.len() {
+        let first = indices[vertex] as usize;
+        indices[vertex] = if first == vertex {
+            all[count] = all[vertex];
+            count += 1;
+            count as u32 - 1
+        } else {
+            indices[first]
+        };
+    }
+    all.truncate(count);
+    all.shrink_to_fit();
+    Ok((all, indices))
 }
 
 /// Whether [`TriangleMesh`] accepts the triangle.
@@ -195,22 +205,23 @@ fn has_area(positions: &[Vec3], triangle: [u32; 3]) -> bool {
 struct Polygon {
     /// Equal for equal corners in any order.
     hash: u64,
-    corners: usize,
+    corners: u32,
     /// Where its corners begin among those of all faces, and its triangles among all triangles.
-    first_corner: usize,
-    first_triangle: usize,
+    first_corner: u32,
+    first_triangle: u32,
 }
 
 /// Gives polygons that repeat an earlier one, from any corner and in either winding, the triangles of that one: only then do they
 /// match. `welded` has the vertex of each of the file's, and `triangles` those of all faces, welded.
 fn split_alike(raw: &RawMesh, welded: &[u32], triangles: &mut [[u32; 3]]) {
     let hasher = BuildHasherDefault::<DefaultHasher>::new();
-    let mut polygons = Vec::new();
+    let is_polygon = |face: &RawFace| face.corners > 3;
+    let mut polygons = Vec::with_capacity(raw.faces.iter().filter(is_polygon).count());
     let (mut first_corner, mut first_triangle) = (0, 0);
     for face in raw.faces.iter() {
-        let corners = face.corners as usize;
-        if corners > 3 {
-            let vertices = raw.corners[first_corner..first_corner + corners].iter();
+        let corners = face.corners;
+        if is_polygon(&face) {
+            let vertices = raw.corners[first_corner as usize..][..corners as usize].iter();
             let hashes = vertices.map(|&vertex| hasher.hash_one(welded[vertex as usize]));
             polygons.push(Polygon {
                 hash: hashes.fold(0, u64::wrapping_add),
@@ -224,11 +235,11 @@ fn split_alike(raw: &RawMesh, welded: &[u32], triangles: &mut [[u32; 3]]) {
     }
     polygons.sort_unstable();
     let cycle = |polygon: &Polygon| {
-        let corners = &raw.corners[polygon.first_corner..][..polygon.corners];
+        let corners = &raw.corners[polygon.first_corner as usize..][..polygon.corners as usize];
         corners.iter().map(|&vertex| welded[vertex as usize])
     };
     for alike in polygons.chunk_by(|a, b| (a.hash, a.corners) == (b.hash, b.corners)) {
-        let (first, count) = (&alike[0], alike[0].corners);
+        let (first, count) = (&alike[0], alike[0].corners as usize);
         for other in &alike[1..] {
             let start = cycle(first).next();
             let Some(start) = cycle(other).position(|corner| Some(corner) == start) else {
@@ -239,8 +250,9 @@ fn split_alike(raw: &RawMesh, welded: &[u32], triangles: &mut [[u32; 3]]) {
             let is_same = cycle(first).eq(forward);
             if is_same || cycle(first).eq(backward) {
                 for offset in 0..count - 2 {
-                    let [a, b, c] = triangles[first.first_triangle + offset];
-                    triangles[other.first_triangle + offset] = if is_same { [a, b, c] } else { [a, c, b] };
+                    let [a, b, c] = triangles[first.first_triangle as usize + offset];
+                    triangles[other.first_triangle as usize + offset] =
+                        if is_same { [a, b, c] } else { [a, c, b] };
                 }
             }
         }
