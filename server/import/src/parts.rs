@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
+use indexmap::IndexSet;
+
 use crate::{
     error::{ImportError, Violations},
     part_names::Role,
@@ -45,12 +47,12 @@ fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Violat
     let mut violations = Violations::default();
     let mut wanted = HashSet::new();
     for (place, name) in requested.iter().enumerate() {
-        if let Some(index) = names.indices.get(name).filter(|index| known.contains(index)) {
-            wanted.insert(*index);
+        let index = names.names.get_index_of(name).map(|index| index as u32);
+        if let Some(index) = index.filter(|index| known.contains(index)) {
+            wanted.insert(index);
             continue;
         }
-        let all = names.names();
-        let known = listed(known.iter().map(|&index| all[index as usize]).collect());
+        let known = listed(known.iter().map(|&index| names.name(index)).collect());
         violations.push(ImportError::NoSuchPart {
             place,
             name: name.clone(),
@@ -73,8 +75,8 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
         let next = parts.len() as u32;
         *parts.entry(part.to_owned()).or_insert(next)
     };
-    let all = names.names();
-    let roles: Vec<Role> = all.iter().map(|name| Role::of(name, &mut index)).collect();
+    let roles = names.names.iter().map(|name| Role::of(name, &mut index));
+    let roles: Vec<Role> = roles.collect();
     let telling = |set: usize| {
         let own = names.sets[set].parts.iter().chain(&names.sets[set].role);
         own.map(|&name| roles[name as usize])
@@ -123,7 +125,6 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
 
 /// One warning for each reason why parts were left out.
 fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> Vec<String> {
-    let all = names.names();
     let mut warnings = Vec::new();
     for (aside, what) in [
         (Aside::Invisible, "that the file hides"),
@@ -135,7 +136,7 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
         let mut count = 0;
         for set in (0..names.sets.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
             count += triangles[set];
-            found.extend(names.sets[set].parts.iter().map(|&name| all[name as usize]));
+            found.extend(names.sets[set].parts.iter().map(|&name| names.name(name)));
         }
         if count > 0 {
             let found = if found.is_empty() {
@@ -171,7 +172,7 @@ pub(crate) fn quoted(name: &str) -> String {
 }
 
 /// Why a part of a file is no part of the object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Aside {
     /// The file says that it is not drawn.
     Invisible,
@@ -184,7 +185,7 @@ pub(crate) enum Aside {
 }
 
 /// The names of faces, as indices, and their purpose in the file.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct FaceNames {
     /// Of groups, objects, solids, nodes and meshes.
     pub(crate) parts: Vec<u32>,
@@ -199,31 +200,29 @@ pub(crate) struct FaceNames {
 /// Sets of names that faces share.
 #[derive(Debug, Default)]
 pub(crate) struct NameSets {
-    /// The index of each name.
-    indices: HashMap<String, u32>,
-    sets: Vec<FaceNames>,
+    names: IndexSet<String>,
+    sets: IndexSet<FaceNames>,
 }
 
 impl NameSets {
     /// The index of a name.
     pub(crate) fn intern(&mut self, name: &str) -> u32 {
-        if let Some(&index) = self.indices.get(name) {
-            return index;
-        }
-        let index = self.indices.len() as u32;
-        self.indices.insert(name.to_owned(), index);
-        index
+        let known = self.names.get_index_of(name);
+        known.unwrap_or_else(|| self.names.insert_full(name.to_owned()).0) as u32
     }
 
-    /// Adds a set; returns its index.
+    fn name(&self, index: u32) -> &str {
+        &self.names[index as usize]
+    }
+
+    /// The index of a set.
     pub(crate) fn add(&mut self, mut names: FaceNames) -> u32 {
         names.parts.sort_unstable();
         names.parts.dedup();
-        self.sets.push(names);
-        self.sets.len() as u32 - 1
+        self.sets.insert_full(names).0 as u32
     }
 
-    /// Adds the set of a part with a name, which may be empty. Returns its index.
+    /// The index of the set of a part with a name, which may be empty.
     pub(crate) fn add_part(&mut self, name: &str) -> u32 {
         let named = (!name.is_empty()).then(|| self.intern(name));
         self.add(FaceNames {
@@ -239,22 +238,12 @@ impl NameSets {
         parts.iter().copied().chain(material)
     }
 
-    /// All names, by index.
-    fn names(&self) -> Vec<&str> {
-        let mut names = vec![""; self.indices.len()];
-        for (name, &index) in &self.indices {
-            names[index as usize] = name;
-        }
-        names
-    }
-
     /// The triangles of each name, sorted by name; `sets` are those of the triangles.
     pub(crate) fn groups(&self, sets: impl Iterator<Item = usize>) -> Vec<(String, Vec<u32>)> {
-        let names = self.names();
         let mut groups = BTreeMap::<&str, Vec<u32>>::new();
         for (triangle, set) in sets.enumerate() {
             for name in self.all(set) {
-                let triangles = groups.entry(names[name as usize]).or_default();
+                let triangles = groups.entry(self.name(name)).or_default();
                 triangles.push(triangle as u32);
             }
         }
