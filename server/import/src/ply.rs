@@ -15,6 +15,9 @@ use crate::{
 /// Elements read between two checks whether to stop.
 const ELEMENTS_PER_CHECK: usize = 1024;
 
+/// Properties of all elements of a file. Splats have 62.
+const MAX_PROPERTIES: usize = 1024;
+
 /// The names of coordinates.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -116,7 +119,7 @@ fn wrong_header(what: impl Into<String>) -> ImportError {
 impl<'a> Header<'a> {
     fn read(bytes: &'a [u8]) -> Result<Self, ImportError> {
         let (mut encoding, mut elements) = (None, Vec::<Element>::new());
-        let (mut lines, mut has_returns) = (0, false);
+        let (mut lines, mut properties, mut has_returns) = (0, 0, false);
         let mut rest = Some(bytes);
         loop {
             let before = rest.ok_or_else(|| wrong_header("does not end: there is no line end_header"))?;
@@ -143,15 +146,18 @@ impl<'a> Header<'a> {
                     let name = String::from_utf8_lossy(name).into_owned();
                     let is_new = elements.iter().all(|element| element.name != name);
                     let count = parsed(count);
-                    let properties = Vec::new();
                     elements.extend(count.map(|count| Element {
                         name,
                         count,
-                        properties,
+                        properties: Vec::new(),
                     }));
                     is_new && count.is_some()
                 }
+                [b"property", ..] if properties == MAX_PROPERTIES => {
+                    return Err(wrong_header(format!("has more than {MAX_PROPERTIES} properties")));
+                }
                 [b"property", ref kind @ .., name] => {
+                    properties += 1;
                     let (length, scalar) = match *kind {
                         [scalar] => (Some(None), scalar),
                         [b"list", length, scalar] => (Scalar::of(length).map(Some), scalar),

@@ -35,6 +35,9 @@ pub(crate) use meshes::{SkinnedMesh, each_weight, in_primitive, inverse_binds, s
 use scene::{COMPRESSIONS, DRACO, can_be_required, may_be_missed, refusal};
 pub(crate) use scene::{Scene, walk};
 
+/// Objects in the text of a document: each takes some hundred bytes in memory, however short it is.
+const MAX_JSON_OBJECTS: usize = 1 << 16;
+
 /// Largest number of extensions that warnings name.
 const LISTED_EXTENSIONS: usize = 8;
 
@@ -71,9 +74,13 @@ pub(crate) fn open<'a>(
     stop: Stop<'a>,
 ) -> Result<Opened<'a>, Violations> {
     let (json, binary) = json_and_binary(bytes)?;
-    // Each object of the text takes some hundred bytes in memory, however short it is.
     let objects = json.split(|&byte| byte == b'{').count() - 1;
-    check_count("the mesh", "JSON objects", objects as u64, limits.triangles)?;
+    check_count(
+        "the glTF document",
+        "JSON objects",
+        objects as u64,
+        limits.triangles.min(MAX_JSON_OBJECTS),
+    )?;
     let mut root: Root = deserialize::from_slice(&json)
         .map_err(|error| ImportError::at("the glTF document", error.to_string()))?;
     let mut refused = Violations::default();

@@ -230,6 +230,8 @@ fn ply_that_cannot_be_read_is_told_by_its_place() {
         "line 5: \"property decimal y\" is not understood",
     );
     refused(&endless, FACES, "more than the");
+    let splats = format!("{VERTICES}{}", "property float f\n".repeat(1024));
+    refused(&splats, FACES, "has more than 1024 properties");
     refused(VERTICES, &nothing, "element \"nothing\" has no properties");
     let headless = message("ply\nformat ascii 1.0\nelement vertex 4\n");
     assert!(headless.contains("there is no line end_header"), "{headless}");

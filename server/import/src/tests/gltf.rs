@@ -278,7 +278,7 @@ fn scenes_that_repeat_themselves_end() {
     // Each takes a hundred times its two bytes.
     let nodes = many(200_000, "{}");
     let nodes = format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}]}}"#);
-    assert!(message(&nodes).contains("200002 JSON objects; at most 100000"));
+    assert!(message(&nodes).contains("200002 JSON objects; at most 65536"));
 }
 
 #[test]
