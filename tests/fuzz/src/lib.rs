@@ -5,6 +5,7 @@ mod requests;
 
 use std::{env, fmt, fs, path::PathBuf, sync::Mutex, time::Duration};
 
+use grasp_characters::ring::Ring;
 use grasp_import::Import;
 use grasp_server::fuzzing::MESH_LIMITS;
 use peak_alloc::PeakAlloc;
@@ -46,8 +47,9 @@ pub struct Target {
     pub words: fn() -> Vec<String>,
 }
 
-/// Inputs of [`Target::dense`] have about so many bytes.
+/// Inputs of [`Target::dense`] have about so many bytes, and at most so many triangles.
 pub const DENSE_BYTES: usize = 1 << 20;
+pub const TRIANGLES: usize = MESH_LIMITS.triangles;
 
 /// Reads a mesh of any format.
 pub fn read_mesh(input: &[u8]) {
@@ -56,7 +58,29 @@ pub fn read_mesh(input: &[u8]) {
 
 /// A start, and as many copies of a part as a dense input has room for.
 pub fn dense(start: &str, part: &[u8]) -> Vec<u8> {
-    [start.as_bytes(), &part.repeat(DENSE_BYTES / part.len())].concat()
+    dense_within(start, part, usize::MAX)
+}
+
+/// The same with few enough copies not to be refused for their number.
+pub fn dense_within(start: &str, part: &[u8], most: usize) -> Vec<u8> {
+    let copies = most.min(DENSE_BYTES / part.len());
+    [start.as_bytes(), &part.repeat(copies)].concat()
+}
+
+/// A usual mesh, with coordinates that are short as text.
+pub fn grid() -> Ring {
+    const SIDES: u32 = 192;
+    let places = |sides: u32| (0..sides).flat_map(move |y| (0..sides).map(move |x| (x, y)));
+    let position = |(x, y): (u32, u32)| [x, y, x * y % 7].map(f64::from);
+    let triangles = |(x, y): (u32, u32)| {
+        let corner = y * SIDES + x;
+        let [a, b, c, d] = [0, 1, SIDES + 1, SIDES].map(|step| corner + step);
+        [[a, b, c], [a, c, d]]
+    };
+    Ring {
+        positions: places(SIDES).map(position).collect(),
+        triangles: places(SIDES - 1).flat_map(triangles).collect(),
+    }
 }
 
 /// Words between spaces.

@@ -4,8 +4,11 @@
 
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use grasp_characters::ring::Ring;
-use grasp_fuzz::{GLTF_LIMITS, GLTF_WORDS, LONGEST, Target, dense, file, fuzz, parts, words};
+use grasp_fuzz::{
+    GLTF_LIMITS, GLTF_WORDS, LONGEST, Target, dense, dense_within, file, fuzz, grid, parts, words,
+};
 use grasp_import::{Import, read_mesh};
+use grasp_server::fuzzing::MESH_LIMITS;
 
 /// A tetrahedron with instances, a sparse accessor, a morph target, a strip and a node that is hidden.
 const ODD: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1,2]}],
@@ -27,7 +30,12 @@ fn odd() -> Vec<u8> {
 
 fuzz!(Target {
     read: |input| {
-        let _ = read_mesh(&file(input), Import::METRES, GLTF_LIMITS);
+        let limits = if input.len() > LONGEST {
+            MESH_LIMITS
+        } else {
+            GLTF_LIMITS
+        };
+        let _ = read_mesh(&file(input), Import::METRES, limits);
     },
     seeds: || {
         let ring = Ring::at([0.0; 3], 3);
@@ -36,7 +44,8 @@ fuzz!(Target {
         vec![parts(&ring.glb("")), ring.glb(""), text.into_bytes(), odd()]
     },
     dense: || vec![
-        dense(r#"{"asset":{"version":"2.0"},"nodes":[{}"#, b",{}"),
+        grid().glb(""),
+        dense_within(r#"{"asset":{"version":"2.0"},"nodes":[{}"#, b",{}", 65_000),
         dense(r#"{"asset":{"version":"2.0"},"extensionsUsed":[""#, br#"","a"#),
         dense(r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0"#, b",0"),
         dense(r#"{"asset":{"version":"2.0"},"extras":[0"#, b",0"),
@@ -44,6 +53,6 @@ fuzz!(Target {
         dense(r#"{"asset":{"version":"2.0"},"a":"#, b"["),
     ],
     longest: LONGEST,
-    dense_bytes_per_byte: 10,
+    dense_bytes_per_byte: 170,
     words: || words(GLTF_WORDS),
 });

@@ -3,7 +3,7 @@
 #![no_main]
 
 use grasp_characters::ring::Ring;
-use grasp_fuzz::{LONGEST, Target, dense, fuzz, read_mesh, words};
+use grasp_fuzz::{LONGEST, TRIANGLES, Target, dense, dense_within, fuzz, grid, read_mesh, words};
 
 /// Every kind of statement, and odd forms of them.
 const STATEMENTS: &[u8] = b"# A comment \\\nmtllib a.mtl\no body\ng a b\nusemtl steel\ns 1
@@ -26,15 +26,17 @@ fuzz!(Target {
         ]
     },
     dense: || vec![
+        grid().obj(false),
+        grid().obj(true),
         dense(CORNERS, b"f 1 2 3\n"),
-        dense(&format!("{CORNERS}f 4"), b" 1 2 3"),
-        dense(CORNERS, b"f 1 2 3 4\n"),
+        dense_within(&format!("{CORNERS}f 4"), b" 1 2 3", TRIANGLES / 3),
+        dense_within(CORNERS, b"f 1 2 3 4\n", TRIANGLES / 2),
         dense(CORNERS, b"g a\nf 1 2 3\nf 4 3 2\n"),
         dense("", b"v 1 2 3\n"),
         dense("", b"f 1 2 3\n"),
         dense("", b"?\n"),
     ],
     longest: LONGEST,
-    dense_bytes_per_byte: 9,
+    dense_bytes_per_byte: 28,
     words: || words("v f g o s l p vn vt vp mtllib usemtl off nan inf 1e39 -1 // 1/1/1 0.5 1e-30 4294967295"),
 });

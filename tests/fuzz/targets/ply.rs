@@ -3,7 +3,9 @@
 #![no_main]
 
 use grasp_characters::ring::Ring;
-use grasp_fuzz::{DENSE_BYTES, LONGEST, Target, dense, fuzz, read_mesh, words};
+use grasp_fuzz::{
+    DENSE_BYTES, LONGEST, TRIANGLES, Target, dense, dense_within, fuzz, grid, read_mesh, words,
+};
 
 /// Elements that are skipped, lists of other things, triangle strips and every type of number.
 const ODD: &[u8] = b"ply\nformat ascii 1.0\nobj_info a\nelement camera 1\nproperty list uchar float view\nelement vertex 4
@@ -13,13 +15,13 @@ end_header\n2 0 0\n0 0 0 1 7\n1 0 0 0\n0 1 0 0\n0 0 1 2 3 4\n9 3 0 1 2\n9 4 0 1 
 
 /// Binary faces of a byte per number.
 fn binary(corners: &[u8]) -> Vec<u8> {
-    let faces = DENSE_BYTES / corners.len();
+    let faces = (DENSE_BYTES / corners.len()).min(TRIANGLES / (corners.len() - 3));
     let header = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty char x\nproperty char y\nproperty char z\n\
          element face {faces}\nproperty list uchar uchar vertex_indices\nend_header\n"
     );
     let vertices = "\0\0\0\x01\0\0\0\x01\0\0\0\x01";
-    dense(&(header + vertices), corners)
+    dense_within(&(header + vertices), corners, faces)
 }
 
 fuzz!(Target {
@@ -32,6 +34,8 @@ fuzz!(Target {
         seeds
     },
     dense: || vec![
+        grid().ply("ascii"),
+        grid().ply("binary_little_endian"),
         binary(&[3, 0, 1, 2]),
         binary(&[4, 0, 1, 2, 3]),
         binary(&[7, 0, 1, 2, 0, 1, 2, 3]),
@@ -39,7 +43,7 @@ fuzz!(Target {
         dense("ply\nformat ascii 1.0\nelement a 0\n", b"property char x\n"),
     ],
     longest: LONGEST,
-    dense_bytes_per_byte: 6,
+    dense_bytes_per_byte: 22,
     words: || words(
         "ply format ascii binary_little_endian binary_big_endian 1.0 comment obj_info element vertex face tristrips property list \
          char uchar short ushort int uint float double int8 uint8 int16 uint16 int32 uint32 float32 float64 x y z vertex_indices \
