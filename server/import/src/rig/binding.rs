@@ -3,6 +3,8 @@
 //! Each bone keeps its place relative to the rig's link that it was bound along, so that the skin follows the links whatever
 //! axes the model's nodes have.
 
+use std::collections::BTreeSet;
+
 use glam::{DMat4, DQuat, DVec3, Quat, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
@@ -149,6 +151,14 @@ impl Binding {
 
 fn matrix(pose: Pose) -> DMat4 {
     DMat4::from_rotation_translation(pose.orientation.as_dquat(), pose.position.as_dvec3())
+}
+
+/// The nodes whose frames a binding has: the hand's root, and its other joints and their parents.
+pub(super) fn needed_nodes(model: &Model, hand: &HandNodes) -> BTreeSet<usize> {
+    let root = root(model, hand);
+    let others = hand.joints.iter().flatten().filter(|&&node| node != root);
+    let with_parents = others.flat_map(|&node| std::iter::once(node).chain(model.parents[node]));
+    with_parents.chain([root]).collect()
 }
 
 /// The lowest node that is or is above every joint of the hand.

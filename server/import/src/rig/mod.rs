@@ -34,6 +34,7 @@ use crate::{
     error::{ImportError, Violations, check_count},
     format::Format,
     gltf::{self, Scene},
+    parts::quoted,
 };
 use hand_nodes::{HandNodes, check_digits, hand_name, hand_nodes, joints_of};
 use model::{BindPose, Model};
@@ -264,6 +265,16 @@ fn read_hand(
     let nodes = 0..model.names.len();
     let joints: Vec<Option<usize>> = nodes.map(|node| hand.nearest_joint(model, node)).collect();
     let bind = BindPose::new(model, &hand.joints, wrist, |node| joints[node].is_some());
+    let before = violations.len();
+    for node in binding::needed_nodes(model, hand) {
+        if !is_invertible(bind.scene_from_node(node)) {
+            let place = format!("node {}", quoted(&model.names[node]));
+            violations.add(place, "has a scale of zero, or one that is not finite");
+        }
+    }
+    if violations.len() > before {
+        return None;
+    }
     if let Some(wrong) = wrong_scale(bind.scene_from_node(wrist)) {
         violations.add(hand_name(side), wrong);
         return None;
@@ -315,14 +326,18 @@ fn read_hand(
     })
 }
 
+/// Whether a transform has a rotation and an inverse.
+fn is_invertible(transform: DMat4) -> bool {
+    let axes = [transform.x_axis, transform.y_axis, transform.z_axis].map(DVec4::length);
+    axes.iter().all(|&length| length > 0.0 && length.is_finite()) && transform.inverse().is_finite()
+}
+
 /// Why a hand cannot be scaled as its wrist is: its bones would not turn as rigid ones.
 fn wrong_scale(bound: DMat4) -> Option<String> {
     let lengths = [bound.x_axis, bound.y_axis, bound.z_axis].map(DVec4::length);
     let most = lengths.into_iter().fold(0.0, f64::max);
     let least = lengths.into_iter().fold(f64::INFINITY, f64::min);
-    if !(least > 0.0 && most.is_finite()) {
-        Some("has a scale of zero, or one that is not finite".to_owned())
-    } else if most > least * (1.0 + UNEVEN_SCALE) {
+    if most > least * (1.0 + UNEVEN_SCALE) {
         Some(format!(
             "is scaled by {least:.4} to {most:.4} along its axes; the scale must be the same along all"
         ))

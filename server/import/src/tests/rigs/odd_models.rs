@@ -161,6 +161,29 @@ fn swapped(side: Handedness, joint: usize) -> Option<String> {
 }
 
 #[test]
+fn bones_without_a_size_are_refused_by_their_names() {
+    let (document, buffer) = opened(&Character::new(&Style::PLAIN).glb);
+    let start = document["bufferViews"][4]["byteOffset"].as_u64().unwrap() as usize;
+    let nodes = document["nodes"].as_array().unwrap();
+    for number in [0.0, f32::NAN] {
+        let mut broken = buffer.clone();
+        let mut expected = Vec::new();
+        for name in ["Left-index-finger-phalanx-distal", "Right-thumb-tip"] {
+            let node = nodes.iter().position(|node| node["name"] == name).unwrap();
+            // The first column of the matrix that binds the skin.
+            let column = start + 64 * node;
+            for place in 0..3 {
+                broken[column + 4 * place..][..4].copy_from_slice(&f32::to_le_bytes(number));
+            }
+            expected.push(format!(
+                "node \"{name}\": has a scale of zero, or one that is not finite"
+            ));
+        }
+        assert_eq!(messages(read(&glb(&document, broken))), expected);
+    }
+}
+
+#[test]
 fn hands_that_cannot_hold_are_refused_with_the_place() {
     let fist = Style {
         bend: 1.3,
