@@ -69,7 +69,7 @@ pub fn dense_within(start: &str, part: &[u8], most: usize) -> Vec<u8> {
 
 /// A usual mesh, with coordinates that are short as text.
 pub fn grid() -> Ring {
-    const SIDES: u32 = 192;
+    const SIDES: u32 = 100;
     let places = |sides: u32| (0..sides).flat_map(move |y| (0..sides).map(move |x| (x, y)));
     let position = |(x, y): (u32, u32)| [x, y, x * y % 7].map(f64::from);
     let triangles = |(x, y): (u32, u32)| {

@@ -1,4 +1,4 @@
-//! Hands of models: glTF, GLB and VRM.
+//! Hands of models: glTF, GLB and VRM, and whether they can be posed.
 
 #![no_main]
 
@@ -10,9 +10,13 @@ use grasp_characters::{
 };
 use grasp_fuzz::{GLTF_LIMITS, GLTF_WORDS, LONGEST, Target, file, fuzz, words};
 use grasp_import::{RigSource, read_rig};
-use grasp_synthesis::model::hand::{
-    Handedness,
-    joints::{JOINT_COUNT, JOINT_NAMES},
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        HandPose, Handedness,
+        joints::{JOINT_COUNT, JOINT_NAMES},
+        kinematics::hand_frames,
+    },
 };
 use serde_json::Value;
 
@@ -28,7 +32,23 @@ fn read(input: &[u8]) {
         radii: [None; JOINT_COUNT],
         is_of_pair: false,
     };
-    let _ = read_rig(&file(input), source, GLTF_LIMITS);
+    let Ok(rig) = read_rig(&file(input), source, GLTF_LIMITS) else {
+        return;
+    };
+    // Its model can be posed.
+    for hand in [&rig.left, &rig.right] {
+        let Some(binding) = &hand.binding else { continue };
+        let pose = HandPose {
+            frame_from_wrist: Pose::IDENTITY,
+            digits: hand.rig.stretched(),
+        };
+        let frames = hand_frames(&hand.rig, &pose);
+        assert!(binding.frame_from_root(&frames, 1.0).position.is_finite());
+        for node in binding.posed(&frames, 1.0) {
+            let is_finite = node.translation.is_none_or(|translation| translation.is_finite());
+            assert!(is_finite && node.rotation.is_normalized(), "{node:?}");
+        }
+    }
 }
 
 /// Every how manyth vertex of a character is left: files of a hundred kilobytes are too slow to be changed often.
