@@ -44,6 +44,9 @@ use rest::Skeleton;
 /// Most nodes of a model: characters have some hundreds.
 const MAX_NODES: usize = 10_000;
 
+/// Largest number in a node's transform and its inverse: a micrometre as seen from a thousand kilometres.
+const MAX_ENTRY: f64 = 1e12;
+
 /// Largest difference of a hand's scale along its axes, as a share.
 const UNEVEN_SCALE: f64 = 0.02;
 
@@ -267,9 +270,9 @@ fn read_hand(
     let bind = BindPose::new(model, &hand.joints, wrist, |node| joints[node].is_some());
     let before = violations.len();
     for node in binding::needed_nodes(model, hand) {
-        if !is_invertible(bind.scene_from_node(node)) {
+        if !is_usable(bind.scene_from_node(node)) {
             let place = format!("node {}", quoted(&model.names[node]));
-            violations.add(place, "has a scale of zero, or one that is not finite");
+            violations.add(place, "has a scale that is zero, not finite or extreme");
         }
     }
     if violations.len() > before {
@@ -326,10 +329,12 @@ fn read_hand(
     })
 }
 
-/// Whether a transform has a rotation and an inverse.
-fn is_invertible(transform: DMat4) -> bool {
-    let axes = [transform.x_axis, transform.y_axis, transform.z_axis].map(DVec4::length);
-    axes.iter().all(|&length| length > 0.0 && length.is_finite()) && transform.inverse().is_finite()
+/// Whether a node's transform has a rotation and an inverse, such that its joint's place in any other is finite in single precision.
+fn is_usable(transform: DMat4) -> bool {
+    [transform, transform.inverse()].iter().all(|matrix| {
+        let entries = matrix.to_cols_array();
+        entries.iter().all(|entry| entry.abs() <= MAX_ENTRY)
+    })
 }
 
 /// Why a hand cannot be scaled as its wrist is: its bones would not turn as rigid ones.

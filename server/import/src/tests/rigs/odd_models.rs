@@ -165,7 +165,7 @@ fn bones_without_a_size_are_refused_by_their_names() {
     let (document, buffer) = opened(&Character::new(&Style::PLAIN).glb);
     let start = document["bufferViews"][4]["byteOffset"].as_u64().unwrap() as usize;
     let nodes = document["nodes"].as_array().unwrap();
-    for number in [0.0, f32::NAN] {
+    for number in [0.0, 1e-30, 1e30, f32::NAN] {
         let mut broken = buffer.clone();
         let mut expected = Vec::new();
         for name in ["Left-index-finger-phalanx-distal", "Right-thumb-tip"] {
@@ -176,7 +176,7 @@ fn bones_without_a_size_are_refused_by_their_names() {
                 broken[column + 4 * place..][..4].copy_from_slice(&f32::to_le_bytes(number));
             }
             expected.push(format!(
-                "node \"{name}\": has a scale of zero, or one that is not finite"
+                "node \"{name}\": has a scale that is zero, not finite or extreme"
             ));
         }
         assert_eq!(messages(read(&glb(&document, broken))), expected);
