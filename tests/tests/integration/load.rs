@@ -219,8 +219,10 @@ async fn a_greedy_client_leaves_places_and_time_to_others() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_long_search_does_not_block_others() {
-    let server = TestServer::start().await;
-    let hopeless = long(&server).await;
+    // Longer than a busy machine takes for the short one.
+    let budget = Duration::from_mins(5);
+    let server = TestServer::start_with(|config| config.budgets.maximum = budget).await;
+    let hopeless = impossible(&server).await.with_budget(budget);
     let mut client = server.grasps().await;
     let long = tokio::spawn(async move { client.find_grasp(hopeless).await });
     until("the long search", || server.gauges().searches() == 1).await;
