@@ -15,7 +15,7 @@ use crate::{
 /// Elements read between two checks whether to stop.
 const ELEMENTS_PER_CHECK: usize = 1024;
 
-/// Properties of all elements of a file. Splats have 62.
+/// Most properties of a file's elements together. Splats have 62.
 const MAX_PROPERTIES: usize = 1024;
 
 /// The names of coordinates.

@@ -35,7 +35,7 @@ pub(crate) use meshes::{SkinnedMesh, each_weight, in_primitive, inverse_binds, s
 use scene::{COMPRESSIONS, DRACO, can_be_required, may_be_missed, refusal};
 pub(crate) use scene::{Scene, walk};
 
-/// Objects in the text of a document: each takes some hundred bytes in memory, however short it is.
+/// Most JSON objects of a document: each takes some hundred bytes in memory, however short it is.
 const MAX_JSON_OBJECTS: usize = 1 << 16;
 
 /// Largest number of extensions that warnings name.
