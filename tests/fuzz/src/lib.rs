@@ -39,10 +39,9 @@ pub struct Target {
     pub seeds: fn() -> Vec<Vec<u8>>,
     /// Longer inputs are left out.
     pub longest: usize,
-    /// Long inputs that need much memory for their size. They are read once, because changed copies are too slow.
-    pub dense: fn() -> Vec<Vec<u8>>,
-    /// Memory that dense inputs may take, as a multiple of their bytes, besides a megabyte.
-    pub dense_bytes_per_byte: usize,
+    /// Long inputs that need much memory for their size, each after the memory that it may take, as a multiple of its bytes, besides a
+    /// megabyte. They are read once, because changed copies are too slow.
+    pub dense: fn() -> Vec<(usize, Vec<u8>)>,
     /// Words of valid inputs.
     pub words: fn() -> Vec<String>,
 }
@@ -54,6 +53,12 @@ pub const TRIANGLES: usize = MESH_LIMITS.triangles;
 /// Reads a mesh of any format.
 pub fn read_mesh(input: &[u8]) {
     let _ = grasp_import::read_mesh(input, Import::METRES, MESH_LIMITS);
+}
+
+/// Dense inputs that may take as much memory as others.
+pub fn bounded_as_all(inputs: impl IntoIterator<Item = Vec<u8>>) -> Vec<(usize, Vec<u8>)> {
+    let inputs = inputs.into_iter();
+    inputs.map(|input| (BYTES_PER_BYTE, input)).collect()
 }
 
 /// A start, and as many copies of a part as a dense input has room for.
@@ -112,8 +117,8 @@ impl Target {
         for seed in &seeds {
             self.run(seed);
         }
-        for (place, input) in (self.dense)().iter().enumerate() {
-            let figures = self.measure(input, self.dense_bytes_per_byte);
+        for (place, (bytes_per_byte, input)) in (self.dense)().iter().enumerate() {
+            let figures = self.measure(input, *bytes_per_byte);
             eprintln!("dense input {place}: {figures}");
             figures.check();
         }

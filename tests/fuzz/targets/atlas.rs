@@ -5,7 +5,7 @@
 use std::sync::LazyLock;
 
 use grasp_assets::hands::hand;
-use grasp_fuzz::{DENSE_BYTES, LONGEST, Target, fuzz};
+use grasp_fuzz::{DENSE_BYTES, LONGEST, Target, bounded_as_all, fuzz};
 use grasp_synthesis::{
     known::{
         codec::{decode, encode},
@@ -66,9 +66,8 @@ fuzz!(Target {
         let mut count = [0; 4];
         count.copy_from_slice(&header[1..5]);
         let count = (u32::from_be_bytes(count) * times as u32).to_be_bytes();
-        vec![[&header[..1], &count, &header[5..], &grips.repeat(times)].concat()]
+        bounded_as_all([[&header[..1], &count, &header[5..], &grips.repeat(times)].concat()])
     },
     longest: LONGEST,
-    dense_bytes_per_byte: 4,
     words: Vec::new,
 });

@@ -5,7 +5,8 @@
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use grasp_characters::ring::Ring;
 use grasp_fuzz::{
-    GLTF_LIMITS, GLTF_WORDS, LONGEST, Target, dense, dense_within, file, fuzz, grid, parts, words,
+    GLTF_LIMITS, GLTF_WORDS, LONGEST, Target, bounded_as_all, dense, dense_within, file, fuzz, grid, parts,
+    words,
 };
 use grasp_import::{Import, read_mesh};
 use grasp_server::fuzzing::MESH_LIMITS;
@@ -43,16 +44,20 @@ fuzz!(Target {
         let text = ring.gltf_json("", &format!(r#","uri":"data:;base64,{data}""#));
         vec![parts(&ring.glb("")), ring.glb(""), text.into_bytes(), odd()]
     },
-    dense: || vec![
-        grid().glb(""),
-        dense_within(r#"{"asset":{"version":"2.0"},"nodes":[{}"#, b",{}", 65_000),
-        dense(r#"{"asset":{"version":"2.0"},"extensionsUsed":[""#, br#"","a"#),
-        dense(r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0"#, b",0"),
-        dense(r#"{"asset":{"version":"2.0"},"extras":[0"#, b",0"),
-        dense(r#"{"asset":{"version":"2.0"},"extensions":{"a":[0"#, b",0"),
-        dense(r#"{"asset":{"version":"2.0"},"a":"#, b"["),
-    ],
+    dense: || {
+        let mut dense = bounded_as_all([
+            grid().glb(""),
+            dense(r#"{"asset":{"version":"2.0"},"extras":[0"#, b",0"),
+            dense(r#"{"asset":{"version":"2.0"},"extensions":{"a":[0"#, b",0"),
+            dense(r#"{"asset":{"version":"2.0"},"a":"#, b"["),
+        ]);
+        let start = r#"{"asset":{"version":"2.0"},"#;
+        let text = |more: &str, part: &[u8], most| dense_within(&format!("{start}{more}"), part, most);
+        dense.push((165, text(r#""nodes":[{}"#, b",{}", 65_000)));
+        dense.push((9, text(r#""extensionsUsed":[""#, br#"","a"#, usize::MAX)));
+        dense.push((6, text(r#""scenes":[{"nodes":[0"#, b",0", usize::MAX)));
+        dense
+    },
     longest: LONGEST,
-    dense_bytes_per_byte: 170,
     words: || words(GLTF_WORDS),
 });

@@ -35,10 +35,9 @@ fuzz!(Target {
             .position(|name| name == "CreateObjectRequest")
             .expect("it is a request");
         [regions, objects, labels]
-            .map(|text| [&[place as u8], text.as_bytes()].concat())
+            .map(|text| (100, [&[place as u8], text.as_bytes()].concat()))
             .to_vec()
     },
     longest: 8 << 10,
-    dense_bytes_per_byte: 100,
     words: names,
 });

@@ -2,7 +2,7 @@
 
 #![no_main]
 
-use grasp_fuzz::{LONGEST, Target, fuzz, requests};
+use grasp_fuzz::{LONGEST, Target, bounded_as_all, fuzz, requests};
 use grasp_proto::v1;
 use grasp_server::fuzzing::{message_of_json, read_request, request_names};
 
@@ -62,12 +62,11 @@ fuzz!(Target {
             ("CreateObjectRequest", 1, b"\x42\0"),
             ("CreateObjectRequest", 1, b"\x5a\0"),
         ];
-        fields
+        let inputs = fields
             .iter()
-            .flat_map(|&(name, outer, field)| repeated(name, outer, field))
-            .collect()
+            .flat_map(|&(name, outer, field)| repeated(name, outer, field));
+        bounded_as_all(inputs)
     },
     longest: LONGEST,
-    dense_bytes_per_byte: 4,
     words: Vec::new,
 });

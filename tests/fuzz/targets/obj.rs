@@ -3,7 +3,9 @@
 #![no_main]
 
 use grasp_characters::ring::Ring;
-use grasp_fuzz::{LONGEST, TRIANGLES, Target, dense, dense_within, fuzz, grid, read_mesh, words};
+use grasp_fuzz::{
+    LONGEST, TRIANGLES, Target, bounded_as_all, dense, dense_within, fuzz, grid, read_mesh, words,
+};
 
 /// Every kind of statement, and odd forms of them.
 const STATEMENTS: &[u8] = b"# A comment \\\nmtllib a.mtl\no body\ng a b\nusemtl steel\ns 1
@@ -25,18 +27,21 @@ fuzz!(Target {
             utf_16,
         ]
     },
-    dense: || vec![
-        grid().obj(false),
-        grid().obj(true),
-        dense(CORNERS, b"f 1 2 3\n"),
-        dense_within(&format!("{CORNERS}f 4"), b" 1 2 3", TRIANGLES / 3),
-        dense_within(CORNERS, b"f 1 2 3 4\n", TRIANGLES / 2),
-        dense(CORNERS, b"g a\nf 1 2 3\nf 4 3 2\n"),
-        dense("", b"v 1 2 3\n"),
-        dense("", b"f 1 2 3\n"),
-        dense("", b"?\n"),
-    ],
+    dense: || {
+        let mut dense = bounded_as_all([
+            grid().obj(false),
+            grid().obj(true),
+            dense(CORNERS, b"f 1 2 3\n"),
+            dense(CORNERS, b"g a\nf 1 2 3\nf 4 3 2\n"),
+            dense("", b"v 1 2 3\n"),
+            dense("", b"f 1 2 3\n"),
+            dense("", b"?\n"),
+        ]);
+        let polygon = dense_within(&format!("{CORNERS}f 4"), b" 1 2 3", TRIANGLES / 3);
+        dense.push((28, polygon));
+        dense.push((7, dense_within(CORNERS, b"f 1 2 3 4\n", TRIANGLES / 2)));
+        dense
+    },
     longest: LONGEST,
-    dense_bytes_per_byte: 28,
     words: || words("v f g o s l p vn vt vp mtllib usemtl off nan inf 1e39 -1 // 1/1/1 0.5 1e-30 4294967295"),
 });

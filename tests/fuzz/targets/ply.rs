@@ -4,7 +4,8 @@
 
 use grasp_characters::ring::Ring;
 use grasp_fuzz::{
-    DENSE_BYTES, LONGEST, TRIANGLES, Target, dense, dense_within, fuzz, grid, read_mesh, words,
+    DENSE_BYTES, LONGEST, TRIANGLES, Target, bounded_as_all, dense, dense_within, fuzz, grid, read_mesh,
+    words,
 };
 
 /// Elements that are skipped, lists of other things, triangle strips and every type of number.
@@ -33,17 +34,19 @@ fuzz!(Target {
         seeds.push(ODD.to_vec());
         seeds
     },
-    dense: || vec![
-        grid().ply("ascii"),
-        grid().ply("binary_little_endian"),
-        binary(&[3, 0, 1, 2]),
-        binary(&[4, 0, 1, 2, 3]),
-        binary(&[7, 0, 1, 2, 0, 1, 2, 3]),
-        dense("ply\nformat ascii 1.0\n", b"element a 0\n"),
-        dense("ply\nformat ascii 1.0\nelement a 0\n", b"property char x\n"),
-    ],
+    dense: || {
+        let mut dense = bounded_as_all([
+            grid().ply("ascii"),
+            grid().ply("binary_little_endian"),
+            dense("ply\nformat ascii 1.0\n", b"element a 0\n"),
+            dense("ply\nformat ascii 1.0\nelement a 0\n", b"property char x\n"),
+        ]);
+        dense.push((8, binary(&[3, 0, 1, 2])));
+        dense.push((12, binary(&[4, 0, 1, 2, 3])));
+        dense.push((20, binary(&[7, 0, 1, 2, 0, 1, 2, 3])));
+        dense
+    },
     longest: LONGEST,
-    dense_bytes_per_byte: 22,
     words: || words(
         "ply format ascii binary_little_endian binary_big_endian 1.0 comment obj_info element vertex face tristrips property list \
          char uchar short ushort int uint float double int8 uint8 int16 uint16 int32 uint32 float32 float64 x y z vertex_indices \

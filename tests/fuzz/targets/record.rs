@@ -3,7 +3,7 @@
 
 #![no_main]
 
-use grasp_fuzz::{LONGEST, Target, fuzz, words};
+use grasp_fuzz::{LONGEST, Target, bounded_as_all, fuzz, words};
 use grasp_proto::v1;
 use grasp_server::fuzzing::{
     read_object_manifest, read_saved_names, read_saved_object, read_saved_rig, read_tokens,
@@ -93,12 +93,11 @@ fn seeds() -> Vec<Vec<u8>> {
 fuzz!(Target {
     read,
     seeds,
-    dense: || vec![
+    dense: || bounded_as_all([
         [b"\x02", &*b"\x0a\x01a".repeat(1 << 18)].concat(),
         [b"\0", &*b"\x52\0".repeat(1 << 19)].concat()
-    ],
+    ]),
     longest: LONGEST,
-    dense_bytes_per_byte: 4,
     words: || words(
         "sha256 scopes find read write shared calls_per_second searches objects bytes mass_kg meters_per_unit z_up center_of_mass \
          friction regions known_grips labels parts name preference weight triangles groups shapes tube box half_space points radii \

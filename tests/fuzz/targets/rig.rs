@@ -115,7 +115,6 @@ fuzz!(Target {
     },
     dense: Vec::new,
     longest: LONGEST,
-    dense_bytes_per_byte: 4,
     words: || {
         let bones =
             "VRM VRMC_vrm humanoid humanBones bone node specVersion rightHand leftHand rightThumbProximal";

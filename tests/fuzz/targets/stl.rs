@@ -3,7 +3,7 @@
 #![no_main]
 
 use grasp_characters::ring::Ring;
-use grasp_fuzz::{DENSE_BYTES, LONGEST, Target, dense, fuzz, grid, read_mesh, words};
+use grasp_fuzz::{DENSE_BYTES, LONGEST, Target, bounded_as_all, dense, fuzz, grid, read_mesh, words};
 
 /// Two solids, the second in odd letters and without triangles.
 const SOLIDS: &[u8] =
@@ -33,14 +33,13 @@ fuzz!(Target {
         let ring = Ring::at([0.0; 3], 3);
         vec![ring.stl_text(), ring.stl_binary(), SOLIDS.to_vec()]
     },
-    dense: || vec![
+    dense: || bounded_as_all([
         grid().stl_text(),
         grid().stl_binary(),
         dense("solid\n", FACET),
         dense("solid\n", b"facet\nendfacet\n"),
         binary()
-    ],
+    ]),
     longest: LONGEST,
-    dense_bytes_per_byte: 4,
     words: || words("solid facet normal outer loop vertex endloop endfacet endsolid nan inf 1e39 -1 0.5"),
 });
